@@ -40,7 +40,7 @@ from valve_friction_ros.commands.arguments.declared import DECLARATIONS
 from valve_friction_ros.commands.arguments.identification import identification_settings
 from valve_friction_ros.fleet.job import Options
 from valve_friction_ros.history.entry import settings_text
-from valve_friction_ros.nodes.identifier.parameters import monitor_settings
+from valve_friction_ros.nodes.identifier.node import monitor_settings
 from valve_friction_ros.nodes.plumbing.parameters import declare_parameters
 from valve_friction_ros.nodes.start import _help_text
 from valve_friction_ros.records import ReadingOptions, read_valve_file

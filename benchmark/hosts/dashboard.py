@@ -22,7 +22,7 @@ import rclpy
 
 from valve_friction_ros.nodes.dashboard.node import Dashboard
 from valve_friction_ros.nodes.plumbing.polled_node import TurnExecutor
-from valve_friction_ros.nodes.plumbing.stop_request import StopRequest
+from valve_friction_ros.nodes.plumbing.running import StopRequest
 
 __all__ = ["main"]
 

@@ -38,13 +38,13 @@ _WRITERS = {
     "identifier/evidence_watch.py": ("values", "_numbers"),
     "identifier/usage_watch.py": ("values",),
     "identifier/response_watch.py": ("values", "_deviation_values", "_move_values"),
-    "identifier/standstill_watch.py": ("values",),
     "identifier/alarm_board.py": ("values",),
     "identifier/alarm_recorder.py": ("values",),
     "identifier/alerts.py": ("_mark",),
     "identifier/history_writer.py": ("values",),
     "identifier/valve_inputs.py": ("values",),
-    "plumbing/readiness.py": ("values",),
+    "identifier/workers.py": ("values",),
+    "plumbing/worker.py": ("values",),
 }
 """Functions that write keys, by file below ``valve_friction_ros/nodes``."""
 

@@ -17,15 +17,15 @@ MENDED = "mended"
 """Name of the file, in the node's working directory, that takes the fault away."""
 
 if __name__ == "__main__":
-    from valve_friction_ros.nodes.identifier import identification, node
+    from valve_friction_ros.nodes.identifier import node, workers
 
-    identify = identification.identify_with_numbers
+    identify = workers.identify_with_numbers
 
     def identify_or_fail(*arguments):
         if not Path(MENDED).exists():
             raise ZeroDivisionError("nobody\nforesaw it")
         return identify(*arguments)
 
-    identification.identify_with_numbers = identify_or_fail
+    workers.identify_with_numbers = identify_or_fail
     node._PROCESSES = 0
     sys.exit(node.main())

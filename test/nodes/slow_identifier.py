@@ -17,9 +17,9 @@ FINISH = "finish"
 """Name of the file, in the node's working directory, that lets an identification end."""
 
 if __name__ == "__main__":
-    from valve_friction_ros.nodes.identifier import identification, node
+    from valve_friction_ros.nodes.identifier import node, workers
 
-    identify_once = identification.identify_with_numbers
+    identify_once = workers.identify_with_numbers
 
     def identify_again_and_again(*arguments):
         while True:
@@ -27,6 +27,6 @@ if __name__ == "__main__":
             if Path(FINISH).exists():
                 return estimate
 
-    identification.identify_with_numbers = identify_again_and_again
+    workers.identify_with_numbers = identify_again_and_again
     node._PROCESSES = 0
     sys.exit(node.main())

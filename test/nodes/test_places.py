@@ -57,7 +57,7 @@ def test_compiled_code_without_a_place_is_said(live, tmp_path):
         "import sys; from valve_friction_ros.model import compiled; "
         "compiled._without_cache.add('one'); "
         "from valve_friction_ros.nodes import simulator; "
-        "import valve_friction_ros.nodes.plumbing.readiness as r; r._QUICK = 0.0; "
+        "import valve_friction_ros.nodes.plumbing.worker as r; r._QUICK = 0.0; "
         "import time; "
         "simulator.compile_kernels = lambda: time.sleep(1.0); sys.exit(simulator.main())"
     )
@@ -74,7 +74,7 @@ def test_diagnostics_say_that_it_prepares(live, tmp_path):
     script.write_text(
         "import sys, time\n"
         "from pathlib import Path\n"
-        "import valve_friction_ros.nodes.plumbing.readiness as readiness\n"
+        "import valve_friction_ros.nodes.plumbing.worker as readiness\n"
         "from valve_friction_ros.nodes.identifier import node, workers\n"
         "readiness._QUICK = 0.0\n"
         "def prepare():\n"

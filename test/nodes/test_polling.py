@@ -27,10 +27,13 @@ from std_srvs.srv import Trigger
 
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.nodes.identifier.valve_inputs import ValveInputs
-from valve_friction_ros.nodes.plumbing.polled_node import PolledNode, TurnExecutor
+from valve_friction_ros.nodes.plumbing.polled_node import (
+    PolledNode,
+    TurnExecutor,
+    create_trigger_service,
+)
 from valve_friction_ros.nodes.plumbing.polled_subscription import PolledSubscription
 from valve_friction_ros.nodes.plumbing.qos import blocks, stream
-from valve_friction_ros.nodes.plumbing.trigger_service import create_trigger_service
 from valve_friction_ros.nodes.plumbing.worker import done_in
 
 

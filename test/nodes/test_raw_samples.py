@@ -18,10 +18,15 @@ from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import FluidPressure, JointState
 from std_msgs.msg import Header
 
-from valve_friction_ros.nodes.plumbing import raw_samples
-from valve_friction_ros.nodes.plumbing.messages import position_of, stamp_of
+from valve_friction_ros.nodes.plumbing import messages
+from valve_friction_ros.nodes.plumbing.messages import (
+    arrivals_of,
+    position_of,
+    positions_in,
+    pressures_in,
+    stamp_of,
+)
 from valve_friction_ros.nodes.plumbing.polled_subscription import TakenMessage
-from valve_friction_ros.nodes.plumbing.raw_samples import arrivals_of, positions_in, pressures_in
 from valve_friction_ros.streams import Kind
 
 NUMBERS = st.floats(width=64)
@@ -113,7 +118,7 @@ def test_bytes_after_the_message_and_in_its_padding_are_nothing(garbage):
         for one, extra in zip(raw, garbage, strict=True)
     ]
     check_pressures(spoilt)
-    assert raw_samples._alike(spoilt, raw_samples._pressure_layout) is not None
+    assert messages._alike(spoilt, messages._pressure_layout) is not None
 
 
 def test_a_stream_is_decoded_as_a_table(monkeypatch):
@@ -127,7 +132,7 @@ def test_a_stream_is_decoded_as_a_table(monkeypatch):
         JointState(header=Header(stamp=Time(sec=k)), name=["arm", "stem"], position=[0.0, 1e-3 * k])
         for k in range(300)
     )
-    monkeypatch.setattr(raw_samples, "deserialize_message", refuse)
+    monkeypatch.setattr(messages, "deserialize_message", refuse)
     assert pressures_in(pressures).values.tolist() == [1e5 + k for k in range(300)]
     assert positions_in(stems, "stem").values.tolist() == [1e-3 * k for k in range(300)]
 

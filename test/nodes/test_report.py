@@ -156,5 +156,5 @@ def test_a_node_that_reports_nothing_loads_nothing_for_it():
         check=True,
         timeout=60,
     ).stdout.split()
-    assert "valve_friction_ros.nodes.identifier.report_service" in loaded
+    assert "valve_friction_ros.nodes.identifier.requested_files" in loaded
     assert not {"matplotlib", "jinja2", "valve_friction_ros.reports"} & set(loaded)

@@ -17,9 +17,10 @@ Each is a class that any executor of rclpy turns, also beside other nodes in a p
     identifier.destroy_node()  # writes what waits
 """
 
-import importlib
 import os
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from valve_friction_ros.on_demand import names_on_demand
 
 if TYPE_CHECKING:
     from valve_friction_ros.nodes.dashboard.node import Dashboard
@@ -27,23 +28,10 @@ if TYPE_CHECKING:
     from valve_friction_ros.nodes.pressure_source import PressureSource
     from valve_friction_ros.nodes.simulator import Simulator
     from valve_friction_ros.nodes.stroke_player import StrokePlayer
+else:
+    __getattr__ = names_on_demand(__name__)
 
 __all__ = ["Dashboard", "Identifier", "PressureSource", "Simulator", "StrokePlayer"]
 
 # Read when numpy is imported: more threads only wait for each other in matrices as small as these.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-
-_PLACES = {
-    "Dashboard": "dashboard.node",
-    "Identifier": "identifier.node",
-    "PressureSource": "pressure_source",
-    "Simulator": "simulator",
-    "StrokePlayer": "stroke_player",
-}
-
-
-def __getattr__(name: str) -> Any:
-    """Import a node when it is asked for."""
-    if name not in _PLACES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(importlib.import_module(f"{__name__}.{_PLACES[name]}"), name)

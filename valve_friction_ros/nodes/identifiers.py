@@ -23,8 +23,7 @@ from rclpy.validate_namespace import validate_namespace
 
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.nodes.identifier.node import Identifier
-from valve_friction_ros.nodes.identifier.results import EstimateTopic
-from valve_friction_ros.nodes.identifier.status import stuck_status
+from valve_friction_ros.nodes.identifier.status import EstimateTopic, stuck_status
 from valve_friction_ros.nodes.identifier.workers import running_workers
 from valve_friction_ros.nodes.plumbing.parameters import declare_parameters
 from valve_friction_ros.nodes.plumbing.polled_node import PolledNode
@@ -43,18 +42,8 @@ participant takes 2 MB and eight threads."""
 _PROFILE = Path(__file__).with_name("many_valves.xml")
 
 
-class FaultyValve(PolledNode):
-    """Stands in for the identifier of a valve that cannot start: it says so, and does no more.
-
-    Parameters
-    ----------
-    place : str
-        Namespace of the valve.
-    problem : str
-        Why it cannot start.
-    context : Context
-        The participant of the graph.
-    """
+class _FaultyValve(PolledNode):
+    """Stands in for the identifier of a valve that cannot start: it says so, and does no more."""
 
     def __init__(self, place: str, problem: str, context: Context) -> None:
         super().__init__(
@@ -77,11 +66,8 @@ class FaultyValve(PolledNode):
         name = f"{self.get_fully_qualified_name()}: friction"
         return stuck_status(name, self._tag, problem)
 
-    def _status(self) -> DiagnosticStatus:
-        return self.stuck_status(self._problem)
-
     def _tell(self) -> None:
-        message = DiagnosticArray(status=[self._status()])
+        message = DiagnosticArray(status=[self.stuck_status(self._problem)])
         self._estimate.publish(message.status[0])
         message.header.stamp = self.get_clock().now().to_msg()
         self._diagnostics.publish(message)
@@ -100,21 +86,15 @@ def _places(valves: Sequence[str]) -> list[str]:
     return places
 
 
-def identifiers_of_valves(
+def _identifiers_of_valves(
     opened: contextlib.ExitStack, arguments: Sequence[str] | None = None
 ) -> Iterator[Node]:
     """Create the node `identifiers`, and an identifier for each valve of its parameter.
 
-    One that cannot start is logged, and a `FaultyValve` stands in for it. What they share is closed
-    with `opened`.
-
-    Raises
-    ------
-    ValueError
-        If no valve is named, or a valve is named twice, or ROS arguments remap a namespace, or no
-        valve can start.
-    rclpy.exceptions.InvalidNamespaceException
-        If a name cannot be a namespace.
+    One that cannot start is logged, and a `_FaultyValve` stands in for it. What they share is
+    closed with `opened`. Raises ValueError if no valve is named, or a valve is named twice, or ROS
+    arguments remap a namespace, or no valve can start; InvalidNamespaceException if a name cannot
+    be a namespace.
     """
     host = PolledNode("identifiers")
     yield host
@@ -140,7 +120,7 @@ def identifiers_of_valves(
                 )
         except (*WRONG_REQUESTS, InternalError, RefusalError) as error:
             faults[place] = " ".join(str(error).split())
-            yield FaultyValve(place, faults[place], context)
+            yield _FaultyValve(place, faults[place], context)
             continue
         yield identifier
         if identifier.get_namespace() != place:
@@ -162,7 +142,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if "FASTRTPS_DEFAULT_PROFILES_FILE" not in os.environ:  # Kilted knows it still
         os.environ.setdefault(PROFILES, str(_PROFILE))
     with contextlib.ExitStack() as opened:
-        return run_nodes(lambda: identifiers_of_valves(opened, arguments), arguments)
+        return run_nodes(lambda: _identifiers_of_valves(opened, arguments), arguments)
 
 
 if __name__ == "__main__":

@@ -30,9 +30,8 @@ from valve_friction_ros.model import (
     converter_response,
 )
 from valve_friction_ros.nodes.plumbing.messages import time_message
-from valve_friction_ros.nodes.plumbing.pace import PacedSteps
 from valve_friction_ros.nodes.plumbing.parameters import declare_parameters, values_of
-from valve_friction_ros.nodes.plumbing.polled_node import PolledNode
+from valve_friction_ros.nodes.plumbing.polled_node import PacedNode
 from valve_friction_ros.nodes.plumbing.qos import qos_overrides, stream
 from valve_friction_ros.nodes.plumbing.running import run_node
 from valve_friction_ros.records.table import read_columns
@@ -97,7 +96,7 @@ def _excitation(values: Mapping[str, Any]) -> Excitation:
     return waves[kind](low, high, period)
 
 
-class PressureSource(PolledNode):
+class PressureSource(PacedNode):
     """Publishes the signal, each sample in time and with its own stamp.
 
     Add it to any executor of rclpy. Raises ValueError for an unknown signal or impossible numbers.
@@ -135,18 +134,9 @@ class PressureSource(PolledNode):
         self._publisher = self.create_publisher(
             FluidPressure, "actuator_pressure", stream(), qos_overriding_options=qos_overrides()
         )
-        self._pace = PacedSteps(self, "signal", self._step)
         self.get_logger().info(f"ready: publishes {self._publisher.topic_name}")
 
-    def poll(self) -> None:
-        """Begin to publish."""
-        self._pace.begin()
-
-    def close(self) -> None:
-        """Publish no more."""
-        self._pace.end()
-
-    def _step(self) -> float:
+    def step(self) -> float:
         """Publish the samples whose time has come; return the time of the next step."""
         begun, now = time.monotonic(), self.get_clock().now().nanoseconds
         if not now:  # use_sim_time, and the clock has not come yet

@@ -28,7 +28,6 @@ from valve_friction_ros.model import (
 )
 from valve_friction_ros.model.checks import require_non_negative
 from valve_friction_ros.nodes.plumbing.messages import stamp_of
-from valve_friction_ros.nodes.plumbing.pace import PacedSteps
 from valve_friction_ros.nodes.plumbing.parameters import (
     declare_parameters,
     karnopp_parameters_from,
@@ -36,12 +35,11 @@ from valve_friction_ros.nodes.plumbing.parameters import (
     values_of,
     valve_from,
 )
-from valve_friction_ros.nodes.plumbing.polled_node import PolledNode
+from valve_friction_ros.nodes.plumbing.polled_node import PacedNode
 from valve_friction_ros.nodes.plumbing.polled_subscription import PolledSubscription
 from valve_friction_ros.nodes.plumbing.qos import qos_overrides, stream
-from valve_friction_ros.nodes.plumbing.readiness import Readiness
 from valve_friction_ros.nodes.plumbing.running import run_node
-from valve_friction_ros.nodes.plumbing.worker import Worker
+from valve_friction_ros.nodes.plumbing.worker import Readiness, Worker
 from valve_friction_ros.settings import NODES
 
 _TICK = 1e-3
@@ -78,7 +76,7 @@ def _plant(values: Mapping[str, Any]) -> _Plant:
     )
 
 
-class Simulator(PolledNode):
+class Simulator(PacedNode):
     """Steps the model by the stamps of the pressure and publishes the stem at the same stamps.
 
     Add it to any executor of rclpy. Raises ValueError for an impossible valve.
@@ -106,20 +104,11 @@ class Simulator(PolledNode):
         )
         self._waiting: deque[FluidPressure] = deque(maxlen=_MOST_WAITING)
         self._pressures = PolledSubscription(self, FluidPressure, "actuator_pressure", stream())
-        self._pace = PacedSteps(self, "stem", self._step)
 
     def _take_parameters(self, _: object) -> None:
         self._plant = _plant(values_of(self, _CHANGEABLE))
 
-    def poll(self) -> None:
-        """Begin to follow the pressure."""
-        self._pace.begin()
-
-    def close(self) -> None:
-        """Follow it no more."""
-        self._pace.end()
-
-    def _step(self) -> float:
+    def step(self) -> float:
         """Let the stem follow the pressures that have arrived; return the time of the next step."""
         begun = time.monotonic()
         # Taken at once: a reliable subscription that is not emptied slows its publishers down.

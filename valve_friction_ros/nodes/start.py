@@ -13,6 +13,7 @@ import importlib
 import os
 import signal
 import sys
+from functools import partial
 
 
 def _end(*_: object) -> None:
@@ -60,31 +61,9 @@ def _help_text(name: str, purpose: str) -> str:
     return "\n".join(lines)
 
 
-def dashboard() -> int:
-    """Run the node `dashboard`."""
-    return _start("dashboard.node")
-
-
-def identifier() -> int:
-    """Run the node `identifier`."""
-    return _start("identifier.node")
-
-
-def identifiers() -> int:
-    """Run the node `identifiers`."""
-    return _start("identifiers")
-
-
-def simulator() -> int:
-    """Run the node `simulator`."""
-    return _start("simulator")
-
-
-def stroke_player() -> int:
-    """Run the node `stroke_player`."""
-    return _start("stroke_player")
-
-
-def pressure_source() -> int:
-    """Run the node `pressure_source`."""
-    return _start("pressure_source")
+dashboard = partial(_start, "dashboard.node")
+identifier = partial(_start, "identifier.node")
+identifiers = partial(_start, "identifiers")
+simulator = partial(_start, "simulator")
+stroke_player = partial(_start, "stroke_player")
+pressure_source = partial(_start, "pressure_source")

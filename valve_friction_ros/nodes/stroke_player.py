@@ -24,13 +24,11 @@ from rclpy.duration import Duration
 from sensor_msgs.msg import FluidPressure, JointState
 from std_msgs.msg import String
 
-from valve_friction_ros.nodes.plumbing.pace import PacedSteps
 from valve_friction_ros.nodes.plumbing.parameters import declare_parameters, values_of
-from valve_friction_ros.nodes.plumbing.polled_node import PolledNode
+from valve_friction_ros.nodes.plumbing.polled_node import PacedNode, create_trigger_service
 from valve_friction_ros.nodes.plumbing.polled_subscription import PolledSubscription
 from valve_friction_ros.nodes.plumbing.qos import LATCHED, stream
 from valve_friction_ros.nodes.plumbing.running import run_node
-from valve_friction_ros.nodes.plumbing.trigger_service import create_trigger_service
 from valve_friction_ros.nodes.pressure_source import pressure_from_file
 from valve_friction_ros.planning.played_test import Abort, PlayedTest, PlayLimits, PlayPhase
 from valve_friction_ros.settings import NODES
@@ -53,7 +51,7 @@ def _played(values: Mapping[str, Any]) -> PlayedTest:
     return PlayedTest(signal, limits)
 
 
-class StrokePlayer(PolledNode):
+class StrokePlayer(PacedNode):
     """Publishes set points while a test is played, and nothing before.
 
     Add it to any executor of rclpy. Raises ValueError for a test that breaks its limits.
@@ -78,15 +76,10 @@ class StrokePlayer(PolledNode):
         self._stems = PolledSubscription(self, JointState, "stem_state", stream())
         create_trigger_service(self, "~/start", self._start, "not started")
         create_trigger_service(self, "~/stop", self._stop)
-        self._pace = PacedSteps(self, "set points", self._step)
-
-    def poll(self) -> None:
-        """Begin to listen."""
-        self._pace.begin()
 
     def close(self) -> None:
         """Go back, and see that this arrives."""
-        self._pace.end()
+        super().close()
         with self._lock:
             if self._test.phase is PlayPhase.PLAYING:
                 self._test.abort(Abort.SHUTDOWN)
@@ -104,7 +97,7 @@ class StrokePlayer(PolledNode):
     async def _stop(self) -> str:
         with self._lock:
             self._test.abort(Abort.ASKED)
-        self._step()
+        self.step()
         return str(self._test)
 
     def _listen(self) -> None:
@@ -122,7 +115,7 @@ class StrokePlayer(PolledNode):
             return math.nan
         return float(positions[place])
 
-    def _step(self) -> float:
+    def step(self) -> float:
         """Set what is due; return the time of the next step."""
         begun = time.monotonic()
         with self._lock:

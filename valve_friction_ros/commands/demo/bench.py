@@ -29,7 +29,7 @@ from valve_friction_ros.nodes.plumbing.messages import position_of, stamp_of
 from valve_friction_ros.nodes.plumbing.polled_subscription import PolledSubscription
 from valve_friction_ros.nodes.plumbing.qos import stream
 from valve_friction_ros.nodes.plumbing.rclpy_private import PROFILES
-from valve_friction_ros.nodes.service_request import (
+from valve_friction_ros.nodes.service_call import (
     TriggerCall,
     UnansweredError,
     set_parameters_request,

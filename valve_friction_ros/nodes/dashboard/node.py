@@ -48,20 +48,20 @@ from valve_friction_ros.dashboard.live_state import Sources
 from valve_friction_ros.dashboard.live_strip import LiveStrip
 from valve_friction_ros.history import server_from
 from valve_friction_ros.nodes.plumbing.managed_node import ManagedNode
-from valve_friction_ros.nodes.plumbing.memory import keep_little_memory
-from valve_friction_ros.nodes.plumbing.output_folder import folder_of
-from valve_friction_ros.nodes.plumbing.parameters import declare_parameters, values_of
-from valve_friction_ros.nodes.plumbing.polled_node import PolledNode, TurnExecutor
-from valve_friction_ros.nodes.plumbing.polled_subscription import PolledSubscription
-from valve_friction_ros.nodes.plumbing.qos import statuses, watched
-from valve_friction_ros.nodes.plumbing.raw_samples import (
+from valve_friction_ros.nodes.plumbing.messages import (
     positions_in,
     pressures_in,
     readable,
 )
-from valve_friction_ros.nodes.plumbing.running import WRONG_REQUESTS, cannot_start
-from valve_friction_ros.nodes.plumbing.stop_request import StopRequest
-from valve_friction_ros.nodes.service_request import LateError, TriggerCall, UnansweredError
+from valve_friction_ros.nodes.plumbing.output_folder import folder_of
+from valve_friction_ros.nodes.plumbing.parameters import declare_parameters, values_of
+from valve_friction_ros.nodes.plumbing.polled_node import PolledNode, TurnExecutor
+from valve_friction_ros.nodes.plumbing.polled_subscription import PolledSubscription
+from valve_friction_ros.nodes.plumbing.processes import keep_little_memory
+from valve_friction_ros.nodes.plumbing.qos import statuses, watched
+from valve_friction_ros.nodes.plumbing.running import WRONG_REQUESTS, StopRequest, cannot_start
+from valve_friction_ros.nodes.plumbing.worker import Companion
+from valve_friction_ros.nodes.service_call import LateError, TriggerCall, UnansweredError
 from valve_friction_ros.outside_text import printable
 from valve_friction_ros.settings import NODES
 
@@ -414,27 +414,22 @@ class Dashboard(ManagedNode):
         self.signals.step(self)
 
 
-class _Turning:
-    """Takes the node's turns in a thread, as long as the context lasts."""
+class _Turning(Companion):
+    """Takes the node's turns in a thread."""
 
     def __init__(self, node: Dashboard) -> None:
+        super().__init__("graph")
         self._node = node
-        self._stop = threading.Event()
         self._executor = TurnExecutor()
         self._executor.add_node(node)
-        self._thread = threading.Thread(target=self._run, name="graph", daemon=True)
 
-    def _run(self) -> None:
-        while not self._stop.wait(_PAUSE) and rclpy.ok():
+    def run(self) -> None:
+        while not self.has_ended.wait(_PAUSE) and rclpy.ok():
             self._executor.turn()
             self._node.poll_guarded()
 
-    def __enter__(self) -> None:
-        self._thread.start()
-
-    def __exit__(self, *_: object) -> None:
-        self._stop.set()
-        self._thread.join(1.0)
+    def end(self) -> None:
+        self.thread.join(1.0)
         self._executor.shutdown(0.1)
 
 

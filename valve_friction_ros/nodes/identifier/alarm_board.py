@@ -38,8 +38,11 @@ from valve_friction_ros.history.status_values import alarm_values
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.nodes.identifier.evidence_watch import EvidenceWatch
 from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
-from valve_friction_ros.nodes.plumbing.polled_node import PolledNode
-from valve_friction_ros.nodes.plumbing.trigger_service import create_service, create_trigger_service
+from valve_friction_ros.nodes.plumbing.polled_node import (
+    PolledNode,
+    create_service,
+    create_trigger_service,
+)
 from valve_friction_ros.settings import NODES
 
 if TYPE_CHECKING:
@@ -153,14 +156,9 @@ class AlarmBoard:
             conditions[kind] = delay.shown
         if events := all_followed(self._alarms, conditions, time):
             self._take(events)
+            valve, days = self._history.valve, self._days
             self._under_way = _Step(
-                partial(
-                    database.follow_alarms,
-                    valve=self._history.valve,
-                    conditions=conditions,
-                    time=time,
-                    days=self._days,
-                )
+                lambda file: database.follow_alarms(file, valve, conditions, time, days)
             )
             self._history.keep_soon(self._under_way)
 
@@ -238,16 +236,8 @@ class AlarmBoard:
 
     async def _made(self, kind: AlarmKind | None, request: AlarmRequest) -> str:
         time = self._node.get_clock().now().nanoseconds
-        step = _Step(
-            partial(
-                database.request_alarms,
-                valve=self._history.valve,
-                kind=kind,
-                request=request,
-                time=time,
-                days=self._days,
-            )
-        )
+        valve, days = self._history.valve, self._days
+        step = _Step(lambda file: database.request_alarms(file, valve, kind, request, time, days))
         if self._history.path is not None:
             await self._history.keep_step(step)
         if step.refusal is not None:

@@ -15,7 +15,6 @@ import shutil
 import time
 from collections.abc import Iterator, Mapping
 from concurrent.futures import Future
-from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -26,9 +25,8 @@ from valve_friction_ros import history as database
 from valve_friction_ros.health import FrictionMonitor, Level
 from valve_friction_ros.history import AlarmRecording
 from valve_friction_ros.identification import RefusalError
-from valve_friction_ros.nodes.identifier.bag_service import bag_writer
 from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
-from valve_friction_ros.nodes.identifier.report_service import ReportWriter
+from valve_friction_ros.nodes.identifier.requested_files import ReportWriter, bag_writer
 from valve_friction_ros.nodes.plumbing.output_folder import OutputFolder, valve_name
 from valve_friction_ros.nodes.plumbing.worker import InternalError, Worker, bugs_reported
 from valve_friction_ros.records.bags.topics import StreamNames
@@ -45,18 +43,16 @@ _STALE = 86_400.0
 """Age, s, from which an unfinished bag is what a killed node has left."""
 
 
-def recording_name(valve: str, stamp: int, level: Level) -> str:
-    """Name the recording of a valve whose level has risen at a time, ns."""
+def _recording_name(valve: str, stamp: int, level: Level) -> str:
     date = utc(stamp)
     return f"alarm_{valve}_{date:%Y%m%dT%H%M%SZ}_{level.name}"
 
 
-def size_of(recording: Path) -> int:
-    """Return the bytes of the files of a recording."""
+def _size_of(recording: Path) -> int:
     return sum(one.stat().st_size for one in recording.iterdir())
 
 
-def remove_recording(recording: Path) -> None:
+def _remove_recording(recording: Path) -> None:
     """Remove the files of a recording, and its folder if nothing else is in it.
 
     What makes it a recording goes last: a node killed meanwhile leaves one, to be removed later.
@@ -90,9 +86,9 @@ def remove_oldest(
     if new in oldest:
         oldest.remove(new)
         oldest.append(new)
-    sizes = [size_of(place) for place in oldest]
+    sizes = [_size_of(place) for place in oldest]
     while oldest and oldest[0] != new and (len(oldest) > most or sum(sizes) > most_bytes):
-        remove_recording(oldest.pop(0))
+        _remove_recording(oldest.pop(0))
         sizes.pop(0)
 
 
@@ -247,7 +243,7 @@ class AlarmRecorder:
         node = self._node
         most, room = self._bounds()
         valve = valve_name(node)
-        name = recording_name(valve, rise.time, rise.level)
+        name = _recording_name(valve, rise.time, rise.level)
         write = bag_writer(node, self._monitor.settings.valve, names)
 
         def write_bag() -> AlarmRecording:
@@ -256,9 +252,9 @@ class AlarmRecorder:
             with self._folder.opened() as folder:
                 remove_oldest(folder, valve, most - (before is None), room, new=before)
                 path = write(folder, name, samples, before)
-                size = size_of(path)
+                size = _size_of(path)
                 if size > room:
-                    remove_recording(path)
+                    _remove_recording(path)
                     raise RefusalError(
                         f"a bag of {size / 1e6:.3g} MB has no room in alarm_megabytes "
                         f"({room / 1e6:g}): raise it"
@@ -281,7 +277,7 @@ class AlarmRecorder:
                 if page.is_symlink():  # it would be followed
                     page.unlink()
                 write(page)
-                if size_of(path) > room:
+                if _size_of(path) > room:
                     page.unlink()
                     return f"{page} has no room in alarm_megabytes: raise it"
                 remove_oldest(path.parent, valve, most, room, new=path)
@@ -331,8 +327,9 @@ class AlarmRecorder:
     def _keep(self, recording: AlarmRecording) -> None:
         """Keep in the history that the alarm was recorded."""
         valve, days = self._history.valve, self._parameter("history_days")
-        keep = partial(database.keep_alarm_recording, valve=valve, one=recording, days=days)
-        self._history.keep_soon(keep)
+        self._history.keep_soon(
+            lambda file: database.keep_alarm_recording(file, valve, recording, days)
+        )
 
 
 def _joined(before: Snapshot, after: Snapshot) -> Snapshot:

@@ -32,11 +32,15 @@ from valve_friction_ros.history.status_values import number_text
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.nodes.identifier.evidence_watch import EvidenceWatch
 from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
-from valve_friction_ros.nodes.identifier.parameters import baseline_from
 from valve_friction_ros.streams import utc_minute
 
 _RESTORE = "restore_baseline"
 _PARAMETER = "baseline_coulomb_friction"
+
+
+def baseline_from(value: float | None) -> Baseline | None:
+    """Build the baseline that its parameter gives; raises ValueError for an impossible one."""
+    return None if value is None or math.isnan(value) else Baseline(value)
 
 
 def _value(baseline: Baseline | None) -> float | None:

@@ -12,10 +12,9 @@
 import math
 import time
 from collections import deque
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import TYPE_CHECKING
 
 from rclpy.node import Node
@@ -152,8 +151,8 @@ class MoveLedger:
             while kept and kept[-1].end > begin:
                 kept.pop()
         self._batch = None
-        change = partial(database.forget_moves_after, valve=self._history.valve, time=begin)
-        self._history.keep_soon(change)
+        valve = self._history.valve
+        self._history.keep_soon(lambda file: database.forget_moves_after(file, valve, begin))
         self._node.get_logger().warning(
             f"the clock was ahead, and has been set back: {count - len(self._moves)} kept moves in "
             "service with stamps of a time to come are dropped"
@@ -178,26 +177,17 @@ class MoveLedger:
             return
         self.reference = reference_by_evidence(evidence)
         if self.reference is not None:
-            valve = self._history.valve
-            self._history.keep_soon(
-                partial(
-                    database.keep_reference,
-                    valve=valve,
-                    built=self._built,
-                    reference=self.reference,
-                )
-            )
+            self._keep_soon(database.keep_reference, self.reference)
 
     def note_change(self, change: FrictionChange | None) -> None:
         """Keep a change of friction in place of the one before; None leaves that."""
-        if change in (None, self.change):
-            return
-        self.change = change
-        self._history.keep_soon(
-            partial(
-                database.keep_change, valve=self._history.valve, built=self._built, change=change
-            )
-        )
+        if change not in (None, self.change):
+            self.change = change
+            self._keep_soon(database.keep_change, change)
+
+    def _keep_soon(self, keep: Callable[..., None], what: object) -> None:
+        valve, built = self._history.valve, self._built
+        self._history.keep_soon(lambda file: keep(file, valve, built, what))
 
     def use(self, built: Valve) -> None:
         """Follow the valve; other forces need other moves, as they do in the file."""
@@ -278,7 +268,12 @@ class EvidenceWatch:
     @property
     def diagnosis(self) -> Diagnosis | None:
         """The diagnosis by the moves; None where there is nothing to compare."""
-        return self._diagnosis()
+        settings, reference = self._monitor.settings, self._ledger.reference
+        valve, factor = settings.valve, self._monitor.common_factor
+        found = diagnosis_by_evidence(
+            self._evidence, valve, self._monitor.baseline, settings.limits, reference
+        )
+        return None if found is None else qualified(found, factor, valve)
 
     @property
     def source(self) -> str:
@@ -351,7 +346,7 @@ class EvidenceWatch:
     def findings(self) -> Sequence[Finding]:
         """Return that friction has grown or collapsed, if so."""
         self._settle()
-        diagnosis = self._diagnosis()
+        diagnosis = self.diagnosis
         if diagnosis is None or diagnosis.level < Level.WARN or diagnosis.state.is_uncertain:
             return ()
         statement, leads = diagnosis.statement, self._leads(diagnosis)
@@ -403,7 +398,7 @@ class EvidenceWatch:
             values["evidence change_ratio high"] = number_text(change.high)
             values["evidence change earliest [time]"] = utc_second(change.earliest)
             values["evidence change latest [time]"] = utc_second(change.latest)
-        diagnosis = self._diagnosis()
+        diagnosis = self.diagnosis
         ratio = None if diagnosis is None else diagnosis.ratio
         return values | ratio_values(ratio, "evidence ")
 
@@ -429,14 +424,6 @@ class EvidenceWatch:
         if band.reason:
             values["evidence dead_band reason"] = band.reason
         return values
-
-    def _diagnosis(self) -> Diagnosis | None:
-        settings, reference = self._monitor.settings, self._ledger.reference
-        valve, factor = settings.valve, self._monitor.common_factor
-        found = diagnosis_by_evidence(
-            self._evidence, valve, self._monitor.baseline, settings.limits, reference
-        )
-        return None if found is None else qualified(found, factor, valve)
 
     def _begin_anew(self) -> None:
         """Begin without moves; what is under way is of other ones."""

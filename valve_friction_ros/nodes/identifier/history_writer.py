@@ -10,11 +10,11 @@
 """The history of the plant, as the identifier writes it, and reads it at the start."""
 
 import contextlib
+import math
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from threading import Lock
 from typing import TYPE_CHECKING, TypeVar
@@ -75,30 +75,29 @@ class WaitingChanges:
     def __init__(self, most: int = _MOST) -> None:
         self._most = most
         self._lock = Lock()
-        self._waiting: list[tuple[_Change, bool]] = []
+        self._waiting: dict[_Change, bool] = {}
         self._identifications = self._others = 0
 
     def add(self, change: _Change, identification: bool = False) -> None:
         """Have a change wait, unless it does; give up another one where there are too many."""
         with self._lock:
-            if any(change == one for one, _ in self._waiting):
-                return
-            self._waiting.append((change, identification))
+            self._waiting.setdefault(change, identification)
             if len(self._waiting) > self._most:
-                goes = next((k for k, (_, is_one) in enumerate(self._waiting) if is_one), 0)
-                _, is_one = self._waiting.pop(goes)
+                oldest = next(iter(self._waiting))
+                goes = next((one for one, is_one in self._waiting.items() if is_one), oldest)
+                is_one = self._waiting.pop(goes)
                 self._identifications += is_one
                 self._others += not is_one
 
     def first(self) -> _Change | None:
         """Return the oldest change, which goes on waiting; None if none waits."""
         with self._lock:
-            return self._waiting[0][0] if self._waiting else None
+            return next(iter(self._waiting), None)
 
     def remove(self, change: _Change) -> None:
         """Let a change go that was made, unless it was given up meanwhile."""
         with self._lock:
-            self._waiting = [one for one in self._waiting if one[0] != change]
+            self._waiting.pop(change, None)
 
     @property
     def given_up(self) -> str:
@@ -113,7 +112,7 @@ class WaitingChanges:
             self._identifications = self._others = 0
 
 
-class HistorySending:
+class _HistorySending:
     """Sends the history to a server, if one is named; without it, nothing is done.
 
     Raises ValueError if the address of the server cannot be used, or there is no file.
@@ -141,13 +140,11 @@ class HistorySending:
             )
 
     def follow(self) -> None:
-        """Log what has changed."""
         news = None if self._sender is None else self._sender.news()
         if news is not None:
             self._node.get_logger().warning(news)
 
     def values(self) -> dict[str, str]:
-        """Return what the diagnostics say of the server."""
         if self._sender is None:
             return {}
         state = self._sender.state
@@ -165,7 +162,6 @@ class HistorySending:
         return values
 
     def close(self) -> None:
-        """Send what can be sent at once."""
         if self._sender is not None:
             self._sender.end()
             self._sender = None
@@ -175,39 +171,23 @@ _HANDOVER = 10.0
 """Time, s, for which a node that ends may still hold the history."""
 
 
-class HistoryGuard:
-    """Watches the history file of one valve.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    valve : str
-        Name of the valve.
-    """
+class _HistoryGuard:
+    """Watches the history file of one valve, and claims what it holds of the valve."""
 
     def __init__(self, path: Path, valve: str) -> None:
         self._path, self._valve = path, valve
-        self._claim = Claim(path, valve)
-        self._refused_since: float | None = None
+        self.claim = Claim(path, valve)
+        self._refused_since = math.inf
         self._known: tuple[int, int] | None = None
 
     def ask(self) -> None:
-        """Claim the history of the valve, unless that is done."""
-        if self._claim.ask():
-            self._refused_since = None
-        elif self._refused_since is None:
-            self._refused_since = time.monotonic()
-
-    def release(self) -> None:
-        """Leave the history to another node."""
-        self._claim.release()
+        is_granted = self.claim.ask()
+        self._refused_since = math.inf if is_granted else min(self._refused_since, time.monotonic())
 
     @property
     def conflict(self) -> str | None:
         """That another node keeps the history of this valve, too, if so."""
-        since = self._refused_since
-        if since is None or time.monotonic() - since < _HANDOVER:
+        if time.monotonic() - self._refused_since < _HANDOVER:
             return None
         return (
             f"another node keeps the history of {self._valve} in {self._path}: end one of them, "
@@ -220,11 +200,9 @@ class HistoryGuard:
         return self._known is not None and self._identity() != self._known
 
     def note(self) -> None:
-        """Note which file it is, if it is there."""
         self._known = self._identity() or self._known
 
     def _identity(self) -> tuple[int, int] | None:
-        """Return by what the system tells the file from another one."""
         try:
             found = self._path.stat()
         except OSError:
@@ -243,6 +221,16 @@ class HistoryWriter:
     """Writes to the history in another thread, so that no slow disk holds up the node.
 
     What could not be written waits, and is tried again with what comes next.
+
+    Attributes
+    ----------
+    valve : KeptValve
+        The valve, as the history calls it.
+    baseline : KeptBaseline or None
+        The baseline that was kept last, with its record; another one may be in force. None where
+        that was withdrawn.
+    trend : Trend or None
+        Drift of the Coulomb friction, as of the latest identification.
     """
 
     def __init__(
@@ -250,7 +238,7 @@ class HistoryWriter:
     ) -> None:
         self._node = node
         self._monitor = monitor
-        self._valve = KeptValve(node.get_fully_qualified_name(), tag)
+        self.valve = KeptValve(node.get_fully_qualified_name(), tag)
         path = node.get_parameter("history_file").value
         try:
             self._file = database.HistoryFile(Path(path).expanduser()) if path else None
@@ -260,21 +248,16 @@ class HistoryWriter:
             ) from None
         self._guard = None
         if self._file is not None:
-            self._guard = HistoryGuard(self._file.path, self._valve.name)
-        self._sending = HistorySending(node, self.path, self._valve)
+            self._guard = _HistoryGuard(self._file.path, self.valve.name)
+        self._sending = _HistorySending(node, self.path, self.valve)
         self._writer = writer
         self._waiting = WaitingChanges()
         self._problem: str | None = None
-        self._trend: Trend | None = None
-        self._baseline: KeptBaseline | None = None
+        self.trend: Trend | None = None
+        self.baseline: KeptBaseline | None = None
         self._former: KeptBaseline | None = None
         self._under_way: list[Future[None]] = []
         self._look: Future[None] | None = None
-
-    @property
-    def valve(self) -> KeptValve:
-        """The valve, as the history calls it."""
-        return self._valve
 
     @property
     def path(self) -> Path | None:
@@ -300,7 +283,7 @@ class HistoryWriter:
     def close(self) -> None:
         """Leave the history to another node."""
         if self._guard is not None:
-            self._guard.release()
+            self._guard.claim.release()
         self._sending.close()
 
     def values(self) -> dict[str, str]:
@@ -315,14 +298,6 @@ class HistoryWriter:
         """Addition to the answer that something was kept; empty if it is in the file."""
         return "".join(f", but it is lost with this node: {one}" for one in self.problems)
 
-    @property
-    def baseline(self) -> KeptBaseline | None:
-        """The baseline that was kept last, with its record; another one may be in force.
-
-        None where that was withdrawn.
-        """
-        return self._baseline
-
     def read(self) -> ValveHistory | None:
         """Read the history of the valve, in any thread; None without a file or entries.
 
@@ -330,13 +305,8 @@ class HistoryWriter:
         """
         if self._file is None:
             return None
-        histories = database.valve_histories(self._file, (self._valve,), 0, _END_OF_TIME)
+        histories = database.valve_histories(self._file, (self.valve,), 0, _END_OF_TIME)
         return histories[0] if histories else None
-
-    @property
-    def trend(self) -> Trend | None:
-        """Drift of the Coulomb friction, as of the latest identification."""
-        return self._trend
 
     def prepare(self) -> HistoryEntry | None:
         """Make the file if it is not there, and read the valve's baseline in it, if any.
@@ -344,33 +314,35 @@ class HistoryWriter:
         What another machine has kept of the valve since is taken from the server first.
         Returns the last success, if any.
         """
-        name = self._valve.name
-        self._tried(lambda file: file.prepare())
+        self._tried(lambda file, _: file.prepare())
         if self._guard is not None:
             self._guard.ask()
             self._guard.note()
         self._sending.take()
-        self._baseline = last = self._tried(lambda file: file.baseline(name))
+        self.baseline = last = self._tried(lambda file, name: file.baseline(name))
         if last is not None:
-            self._former = self._tried(lambda file: file.baseline(name, until=last.time))
-        return self._tried(lambda file: file.last_success(name))
+            self._former = self._tried(lambda file, name: file.baseline(name, until=last.time))
+        return self._tried(lambda file, name: file.last_success(name))
 
     def known_numbers(self, earlier: HistoryEntry) -> KnownNumbers | None:
         """Read what is known of the valve since its baseline was set, by the last success, too."""
-        name, built, kept = self._valve.name, self._monitor.settings.valve, self._baseline
+        built, kept = self._monitor.settings.valve, self.baseline
         since = earlier.time if kept is None else min(kept.time, earlier.time)
-        return self._tried(lambda file: file.known_numbers(name, built, since))
+        return self._tried(lambda file, name: file.known_numbers(name, built, since))
 
     def read_trend(self) -> None:
         """Compute the trend with the baseline and settings of now."""
-        self._trend = self._tried(self._trend_job())
+        self.trend = self._tried(self._trend_job())
 
-    def _tried(self, job: Callable[["HistoryFile"], _T]) -> _T | None:
-        """Do a job on the file, if there is one; of several problems the first is reported."""
+    def _tried(self, job: Callable[..., _T], *arguments: object) -> _T | None:
+        """Do a job on the file and the name of the valve, if there is a file.
+
+        Of several problems the first is reported.
+        """
         if self._file is None:
             return None
         try:
-            return job(self._file)
+            return job(self._file, self.valve.name, *arguments)
         except HistoryError as error:
             if self._problem is None:
                 self._complain(error)
@@ -384,7 +356,7 @@ class HistoryWriter:
         found = monitor.stamp if refusal is None else None
         days = self._node.get_parameter("history_days").value
         with self._failures_remembered():
-            entry = entry_of(monitor, self._valve, *identified, found or now, refusal)
+            entry = entry_of(monitor, self.valve, *identified, found or now, refusal)
             await self._written(lambda file: file.add(entry, days), identification=True)
 
     def kept_now(
@@ -422,26 +394,24 @@ class HistoryWriter:
 
     async def keep_baseline(self, kept: KeptBaseline) -> None:
         """Keep a baseline that is in force from now on, or none."""
-        self._former, self._baseline = self._baseline, None if kept.withdrawn else kept
-        with self._failures_remembered():
-            await self._written(lambda file: file.set_baseline(self._valve, kept))
+        self._former, self.baseline = self.baseline, None if kept.withdrawn else kept
+        await self.keep_change(lambda file: file.set_baseline(self.valve, kept))
 
     def usage(self) -> ValveUsage | None:
         """Read what the valve has done; None without a file, or where it cannot be read."""
-        return self._tried(lambda file: database.read_usage(file, self._valve.name))
+        return self._tried(database.read_usage)
 
     def told_level(self) -> Level | None:
         """Read the level that was told last, if any."""
-        return self._tried(lambda file: database.read_told_level(file, self._valve.name))
+        return self._tried(database.read_told_level)
 
     def keep_told_level(self, level: Level) -> None:
         """Keep the level that was told last, soon."""
-        valve = self._valve
-        self.keep_soon(lambda file: database.keep_told_level(file, valve, level))
+        self.keep_soon(lambda file: database.keep_told_level(file, self.valve, level))
 
     def alarms(self) -> dict[AlarmKind, Alarm]:
         """Read the alarms of the valve; none without a file, or where it cannot be read."""
-        return self._tried(lambda file: database.read_alarms(file, self._valve.name)) or {}
+        return self._tried(database.read_alarms) or {}
 
     def alarm_news(self) -> dict[AlarmKind, Alarm]:
         """Return alarms of the valve that have changed in the file, also by another process."""
@@ -454,24 +424,24 @@ class HistoryWriter:
             self._look = None
         if self._look is None and feed.is_due(time.monotonic()):
             self._look = self._writer.submit(feed.look)
-        return feed.take(self._valve.name)
+        return feed.take(self.valve.name)
 
     def last_alarm(self) -> AlarmRecording | None:
         """Read the latest recording of an alarm, if any.
 
         Those of a time to come, from before the clock went back, are the latest if all are.
         """
-        found = self._tried(lambda file: database.alarm_recordings(file, self._valve.name)) or ()
+        found = self._tried(database.alarm_recordings) or ()
         now = self._node.get_clock().now().nanoseconds
         past = [one for one in found if one.time <= now]
         return max(past or found, key=lambda one: one.time, default=None)
 
-    async def keep_change(self, change: Callable[["HistoryFile"], None]) -> None:
+    async def keep_change(self, change: _Change) -> None:
         """Make a change in the writer's thread, and wait until it is written."""
         with self._failures_remembered():
             await self._written(change)
 
-    async def keep_step(self, change: Callable[["HistoryFile"], None]) -> None:
+    async def keep_step(self, change: _Change) -> None:
         """Make a change like `keep_change`, which leaves the trend as it is."""
         if self._file is None:
             return
@@ -481,25 +451,21 @@ class HistoryWriter:
 
     def moves(self) -> tuple[Move, ...]:
         """Read the moves of the valve in service; none without a file."""
-        built = self._monitor.settings.valve
-        return self._tried(lambda file: database.read_moves(file, self._valve.name, built)) or ()
+        return self._tried(database.read_moves, self._monitor.settings.valve) or ()
 
     def reference(self) -> Reference | None:
         """Read what the moves of the valve said first; None without a file."""
-        built = self._monitor.settings.valve
-        return self._tried(lambda file: database.read_reference(file, self._valve.name, built))
+        return self._tried(database.read_reference, self._monitor.settings.valve)
 
     def change(self) -> FrictionChange | None:
         """Read the last change of friction that the moves showed; None without a file."""
-        built = self._monitor.settings.valve
-        return self._tried(lambda file: database.read_change(file, self._valve.name, built))
+        return self._tried(database.read_change, self._monitor.settings.valve)
 
     def answers(self) -> tuple[StepAnswer, ...]:
         """Read the answers of the stem to its command; none without a file."""
-        travel = self._monitor.settings.valve.travel
-        return self._tried(lambda file: database.read_answers(file, self._valve.name, travel)) or ()
+        return self._tried(database.read_answers, self._monitor.settings.valve.travel) or ()
 
-    def keep_soon(self, change: Callable[["HistoryFile"], None]) -> None:
+    def keep_soon(self, change: _Change) -> None:
         """Make a change in the writer's thread, and do not wait; `settle` takes its outcome.
 
         A change that waits already is not made twice.
@@ -509,9 +475,8 @@ class HistoryWriter:
         self._waiting.add(change)
         # A job that has begun may have looked for the last time.
         if all(one.running() or one.done() for one in self._under_way):
-            self._under_way.append(
-                self._writer.submit(self._write_waiting, self._file, time.monotonic())
-            )
+            job = self._writer.submit(self._write_waiting, self._file, time.monotonic())
+            self._under_way.append(job)
 
     def settle(self) -> None:
         """Take the outcomes of `keep_soon` that are there, and claim what was not granted."""
@@ -522,22 +487,18 @@ class HistoryWriter:
             with self._failures_remembered():
                 self._under_way.pop(0).result()
 
-    def _trend_job(self) -> Callable[["HistoryFile"], Trend | None]:
+    def _trend_job(self) -> Callable[["HistoryFile", str], Trend | None]:
         """Return what computes the trend with the baseline and settings of now, in any thread."""
-        monitor, name = self._monitor, self._valve.name
-        return partial(
-            database.current_trend, valve=name, baseline=monitor.baseline, settings=monitor.settings
-        )
+        baseline, settings = self._monitor.baseline, self._monitor.settings
+        return lambda file, name: database.current_trend(file, name, baseline, settings)
 
-    async def _written(
-        self, change: Callable[["HistoryFile"], None], identification: bool = False
-    ) -> None:
+    async def _written(self, change: _Change, identification: bool = False) -> None:
         """Write a change, and what waits since before; then compute the trend."""
         if self._file is None:
             return
         self._waiting.add(change, identification)
         job = (self._file, time.monotonic(), self._trend_job())
-        self._trend = await done_in(self._writer, self._write, *job)
+        self.trend = await done_in(self._writer, self._write, *job)
 
     @contextlib.contextmanager
     def _failures_remembered(self) -> Iterator[None]:
@@ -554,11 +515,11 @@ class HistoryWriter:
             self._complain(error)
 
     def _write(
-        self, file: "HistoryFile", asked: float, trend: Callable[["HistoryFile"], Trend | None]
+        self, file: "HistoryFile", asked: float, trend: Callable[["HistoryFile", str], Trend | None]
     ) -> Trend | None:
         """Write, in the writer's thread, all that waits; asked for at a time (monotonic, s)."""
         self._write_waiting(file, asked)
-        return trend(file)
+        return trend(file, self.valve.name)
 
     def _write_waiting(self, file: "HistoryFile", asked: float) -> None:
         if self._guard is None or self._waiting.first() is None:
@@ -566,25 +527,22 @@ class HistoryWriter:
         with self._writer.writing(file.path, asked):
             if self._guard.is_another:
                 self._keep_again(file)
-            self._write_all(file)
+            while (change := self._waiting.first()) is not None:
+                change(file)
+                self._waiting.remove(change)
         self._guard.note()
 
     def _keep_again(self, file: "HistoryFile") -> None:
         """Keep the baseline in force where the file was removed, or another one has none."""
-        name, kept = self._valve.name, self._baseline
+        name, kept = self.valve.name, self.baseline
         told = "its baseline counts after a restart"
         if kept is not None and not (file.path.exists() and file.baselines(name)):
-            file.set_baseline(self._valve, kept)
+            file.set_baseline(self.valve, kept)
             told = "the baseline in force is kept again"
         self._node.get_logger().warning(
             f"{file.path} was removed or replaced while the node runs: what it held of the valve "
             f"is gone; {told}"
         )
-
-    def _write_all(self, file: "HistoryFile") -> None:
-        while (change := self._waiting.first()) is not None:
-            change(file)
-            self._waiting.remove(change)
 
     def _complain(self, error: HistoryError | InternalError) -> None:
         if str(error) != self._problem:

@@ -13,44 +13,41 @@ import math
 import sys
 import time
 from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
+from dataclasses import fields
+from functools import partial
 from typing import Any, Protocol
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from rclpy.callback_groups import CallbackGroup, ReentrantCallbackGroup
+from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock, ClockType, JumpThreshold, TimeJump
 from rclpy.duration import Duration
-from rclpy.node import Node
 from rclpy.parameter import Parameter
-from rclpy.timer import Timer
 
 from valve_friction_ros.health import (
     AlarmKind,
     Finding,
+    FrictionLimits,
     FrictionMonitor,
     Level,
+    MonitorSettings,
     RefusedRecordError,
+    SurveyLimits,
+    ValveLimits,
     by_severity,
 )
 from valve_friction_ros.health.valve_changes import DIFFERENCES
-from valve_friction_ros.identification import RefusalError
+from valve_friction_ros.identification import STATED, RefusalError, require_valve_units
 from valve_friction_ros.nodes.identifier.alarm_board import AlarmBoard
 from valve_friction_ros.nodes.identifier.alarm_recorder import AlarmRecorder
 from valve_friction_ros.nodes.identifier.alerts import Alerts, FaultLog, LevelLog, webhook_from
-from valve_friction_ros.nodes.identifier.bag_service import BagSaver
-from valve_friction_ros.nodes.identifier.baseline_in_force import BaselineInForce
+from valve_friction_ros.nodes.identifier.baseline_in_force import BaselineInForce, baseline_from
 from valve_friction_ros.nodes.identifier.evidence_watch import EvidenceWatch
 from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
-from valve_friction_ros.nodes.identifier.identification import Identification
-from valve_friction_ros.nodes.identifier.parameters import (
-    CHANGEABLE,
-    monitor_settings,
-    require_valid,
-)
-from valve_friction_ros.nodes.identifier.report_service import ReportWriter
-from valve_friction_ros.nodes.identifier.response_watch import ResponseWatch
-from valve_friction_ros.nodes.identifier.results import EstimateTopic, NumberTopics
-from valve_friction_ros.nodes.identifier.standstill_watch import StandstillWatch
+from valve_friction_ros.nodes.identifier.requested_files import BagSaver, ReportWriter
+from valve_friction_ros.nodes.identifier.response_watch import ResponseWatch, StandstillWatch
 from valve_friction_ros.nodes.identifier.status import (
+    EstimateTopic,
+    NumberTopics,
     estimate_status,
     fail,
     friction_status,
@@ -58,82 +55,76 @@ from valve_friction_ros.nodes.identifier.status import (
 )
 from valve_friction_ros.nodes.identifier.usage_watch import UsageWatch
 from valve_friction_ros.nodes.identifier.valve_inputs import ValveInputs
-from valve_friction_ros.nodes.identifier.workers import Workers, running_workers
+from valve_friction_ros.nodes.identifier.workers import (
+    Identification,
+    Schedule,
+    Workers,
+    running_workers,
+)
 from valve_friction_ros.nodes.plumbing.managed_node import ManagedNode
 from valve_friction_ros.nodes.plumbing.parameters import (
     declare_parameters,
     reject_invalid,
     values_of,
+    valve_from,
     warn_of_columns,
 )
-from valve_friction_ros.nodes.plumbing.readiness import Readiness
+from valve_friction_ros.nodes.plumbing.polled_node import create_trigger_service
 from valve_friction_ros.nodes.plumbing.running import run_node
-from valve_friction_ros.nodes.plumbing.trigger_service import create_trigger_service
-from valve_friction_ros.nodes.plumbing.worker import InternalError
-from valve_friction_ros.settings import NODES
+from valve_friction_ros.nodes.plumbing.worker import InternalError, Readiness
+from valve_friction_ros.settings import (
+    IDENTIFICATION,
+    NODES,
+    VALVE,
+    identification_from,
+    survey_from,
+)
 from valve_friction_ros.streams import Arrivals, DataQuality, Intake, Signal
 from valve_friction_ros.wording import Code, Statement, said, sentence
 
+CHANGEABLE = tuple(one for one in NODES["identifier"] if not one.read_only)
+"""Those that can be changed while the node runs."""
 
-class Schedule:
-    """Calls for an identification by the node's clock, and remembers why the last was skipped.
 
-    A skip changes neither diagnosis nor level, and it is not logged. `group` is reentrant, so that
-    other callbacks run while an identification is awaited.
+def monitor_settings(values: Mapping[str, Any]) -> MonitorSettings:
+    """Build the settings of the monitor from parameter values.
+
+    Raises ValueError if they break a rule; the message names it.
     """
+    given = {one.name: values[one.name] for one in IDENTIFICATION if one.is_given(values[one.name])}
+    stated = {name: values[name] for name in STATED if values[name] is not None}
+    given["assumed_mass"] = stated.get("mass", values["assumed_mass"])
+    return MonitorSettings(
+        valve=valve_from(values),
+        identification=identification_from(
+            given,
+            stated=stated,
+            assumed=tuple(one.name for one in VALVE if values[one.name] is None),
+        ),
+        method=values["method"],
+        limits=FrictionLimits(
+            **{one.name: values[one.name] for one in fields(FrictionLimits) if one.compare},
+            survey=SurveyLimits.of_packing(**survey_from(values)),
+        ),
+        window=values["window"],
+        valve_limits=ValveLimits(**{one.name: values[one.name] for one in fields(ValveLimits)}),
+    )
 
-    def __init__(
-        self, node: Node, identify: Callable[[], Awaitable[None]], group: CallbackGroup
-    ) -> None:
-        self._node = node
-        self._identify = identify
-        self._group = group
-        self._period = 0.0
-        self._timer: Timer | None = None
-        self._skip: tuple[str, int] | None = None
-        self.follow()
 
-    def follow(self) -> None:
-        """Follow the parameter."""
-        period = self._node.get_parameter("period").value
-        if period == self._period:
-            return
-        if self._timer is not None:
-            self._node.destroy_timer(self._timer)
-            self._timer = None
-        if period > 0:
-            self._timer = self._node.create_timer(
-                period, self._identify, callback_group=self._group
+def _require_valid(values: Mapping[str, Any]) -> None:
+    """Raise ValueError, which names the broken rule, if parameter values break one."""
+    settings = monitor_settings(values)
+    how = settings.identification
+    require_valve_units(settings.valve, {**how.stated, **how.fixed})
+    baseline_from(values["baseline_coulomb_friction"])
+    for one in CHANGEABLE:
+        if one.choices and one.spell(values[one.name]) not in one.choices:
+            raise ValueError(
+                f"{one.name} must be {' or '.join(one.choices)}, got {values[one.name]!r}"
             )
-        self._period, self._skip = period, None
-
-    def skip(self, reason: str) -> None:
-        """Remember that nothing was identified, and why.
-
-        What began before the schedule ended may end after it, and does not count.
-        """
-        if self._timer is not None:
-            self._skip = reason, self._node.get_clock().now().nanoseconds
-
-    def stall(self) -> None:
-        """Remember that nothing new has come; an older reason for a skip still holds."""
-        if self._skip is None:
-            self.skip("no new samples since the last identification")
-
-    def succeed(self) -> None:
-        """Forget the last skip."""
-        self._skip = None
-
-    def values(self) -> dict[str, str]:
-        """Return the values of the diagnostic for the last skip, if there was any."""
-        if self._skip is None:
-            return {}
-        reason, stamp = self._skip
-        age = (self._node.get_clock().now().nanoseconds - stamp) / 1e9
-        return {"scheduled_skip": reason, "scheduled_skip_age [s]": f"{age:.3f}"}
 
 
-class WholeValve:
+class _WholeValve:
     """Shows the findings of the latest result, and each change with its interval (a `Watch`)."""
 
     def __init__(self, monitor: FrictionMonitor) -> None:
@@ -143,7 +134,6 @@ class WholeValve:
         """Take no samples: the identification has them."""
 
     def findings(self) -> Sequence[Finding]:
-        """Return what has changed since the baseline."""
         return self._monitor.findings
 
     def values(self) -> dict[str, str]:
@@ -206,7 +196,7 @@ class Identifier(ManagedNode):
         super().__init__("identifier", namespace=namespace, **named)
         try:
             declare_parameters(self, NODES["identifier"])
-            reject_invalid(self, CHANGEABLE, require_valid)
+            reject_invalid(self, CHANGEABLE, _require_valid)
             self.add_post_set_parameters_callback(self._take_parameters)
             self._shared_workers = workers
             self._status_name = f"{self.get_fully_qualified_name()}: friction"
@@ -222,7 +212,7 @@ class Identifier(ManagedNode):
         self._workers = workers
         warn_of_columns(self)
         values = values_of(self, CHANGEABLE)
-        require_valid(values)
+        _require_valid(values)
         webhook = webhook_from(self.get_parameter("webhook_url").value)
         self._monitor = FrictionMonitor(monitor_settings(values))
         self._bags = BagSaver(self, self._monitor)
@@ -262,7 +252,7 @@ class Identifier(ManagedNode):
         self._alarm = AlarmRecorder(
             self, self._monitor, self._history, self._reports, workers.files
         )
-        whole_valve, standstill = WholeValve(self._monitor), StandstillWatch(self._monitor)
+        whole_valve, standstill = _WholeValve(self._monitor), StandstillWatch(self._monitor)
         self._watches: tuple[Watch, ...] = (
             whole_valve,
             standstill,
@@ -281,10 +271,10 @@ class Identifier(ManagedNode):
             ("identify", self._identify, ""),
             ("save", self._save, "the buffer was not saved"),
             ("report", self._report, "no report was written"),
-            ("set_baseline", self._set_baseline, ""),
-            ("restore_baseline", self._restore_baseline, ""),
+            ("set_baseline", partial(self._shown, self._baseline.set), ""),
+            ("restore_baseline", partial(self._shown, self._baseline.restore), ""),
             ("clear", self._clear, ""),
-            ("reset_usage", self._reset_usage, ""),
+            ("reset_usage", partial(self._shown, self._reset_usage), ""),
         ):
             create_trigger_service(self, f"~/{name}", work, failure)
         steady = Clock(clock_type=ClockType.STEADY_TIME)  # sim time may never come, or stand still
@@ -427,13 +417,8 @@ class Identifier(ManagedNode):
     async def _report(self) -> str:
         return str(await self._reports.written(self._workers.files))
 
-    async def _set_baseline(self) -> str:
-        answer = await self._baseline.set()
-        self._publish_diagnostics()
-        return answer
-
-    async def _restore_baseline(self) -> str:
-        answer = await self._baseline.restore()
+    async def _shown(self, work: Callable[[], Awaitable[str]]) -> str:
+        answer = await work()
         self._publish_diagnostics()
         return answer
 
@@ -448,9 +433,7 @@ class Identifier(ManagedNode):
         self._evidence.renew()
         self._response.renew()
         self._monitor.renew(self.get_clock().now().nanoseconds)
-        answer = await self._usage.reset()
-        self._publish_diagnostics()
-        return answer
+        return await self._usage.reset()
 
     def _silence(self) -> list[str]:
         clock = self.get_clock()

@@ -11,7 +11,6 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from functools import partial
 from itertools import pairwise
 from time import monotonic
 from typing import Any
@@ -22,11 +21,21 @@ from rclpy.node import Node
 from sensor_msgs.msg import JointState
 
 from valve_friction_ros import history as database
-from valve_friction_ros.health import Finding, FrictionMonitor, Level, StatusSignal, dead_band
+from valve_friction_ros.health import (
+    Finding,
+    FrictionMonitor,
+    Level,
+    Standstill,
+    StandstillCounter,
+    StatusSignal,
+    dead_band,
+    standstill_finding,
+)
+from valve_friction_ros.history.status_values import number_text
 from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
+from valve_friction_ros.nodes.plumbing.messages import positions_in, readable
 from valve_friction_ros.nodes.plumbing.polled_subscription import PolledSubscription
 from valve_friction_ros.nodes.plumbing.qos import stream
-from valve_friction_ros.nodes.plumbing.raw_samples import positions_in, readable
 from valve_friction_ros.response import (
     SIZES,
     ResponseLimits,
@@ -42,25 +51,19 @@ _PATIENCE = 60.0
 """Time, s, for which commands come, and none can be used, before it is found."""
 
 
-class CommandTrouble:
+class _CommandTrouble:
     """Remembers what is wrong with the latest commands, and since when none could be used."""
 
     def __init__(self) -> None:
         self.forget()
 
     def forget(self) -> None:
-        """Forget it, as where nobody gives commands any more."""
-        self._problem = ""
+        self.problem = ""
         self._first = self._last = math.nan
-
-    @property
-    def problem(self) -> str:
-        """What is wrong with the latest commands; empty: nothing."""
-        return self._problem
 
     def take(self, problem: str, is_used: bool, now: float) -> None:
         """Note what is wrong with commands that have come at a time, s, and whether one is used."""
-        self._problem = problem
+        self.problem = problem
         if is_used:
             self._first = self._last = math.nan
             return
@@ -72,7 +75,7 @@ class CommandTrouble:
         """Return a finding where commands have come for a minute, and none could be used."""
         if not self._last - self._first >= _PATIENCE:
             return []
-        unusable = said(Code.COMMANDS_UNUSABLE, problem=self._problem)
+        unusable = said(Code.COMMANDS_UNUSABLE, problem=self.problem)
         return [Finding(Level.WARN, StatusSignal.CHECK_FUNCTION, unusable)]
 
 
@@ -103,7 +106,7 @@ class ResponseWatch:
         self._written_at = monotonic()
         if earlier := history.answers():
             self._begin(earlier)
-        self._trouble = CommandTrouble()
+        self._trouble = _CommandTrouble()
         self._standing = self._wrong = ""
 
     def _begin(self, earlier: Sequence[StepAnswer] = ()) -> ResponseMonitor:
@@ -209,12 +212,9 @@ class ResponseWatch:
         """Write what is not written yet; the writer's thread finishes it."""
         self._written_at = monotonic()
         if self._monitor is not None and (moves := self._monitor.drain()):
-            days = self._node.get_parameter("history_days").value
-            valve = self._history.valve
+            valve, travel, days = self._history.valve, self._travel, self._value("history_days")
             self._history.keep_soon(
-                partial(
-                    database.keep_answers, valve=valve, travel=self._travel, moves=moves, days=days
-                )
+                lambda file: database.keep_answers(file, valve, travel, moves, days)
             )
 
     def findings(self) -> Sequence[Finding]:
@@ -243,14 +243,11 @@ class ResponseWatch:
         if silence > _SILENCE:
             self._polled.follow_publishers()
         is_silent = silence > self._value("input_timeout")
-        if not is_silent or self._input_is_offered():
+        if not is_silent or self._node.count_publishers(self._polled.topic):
             return
         self._trouble.forget()
         if self._monitor is not None:
             self._monitor.forget()
-
-    def _input_is_offered(self) -> bool:
-        return bool(self._node.count_publishers(self._polled.topic))
 
     def values(self) -> Mapping[str, str]:
         """Return the figures of the latest moves."""
@@ -324,3 +321,53 @@ def _move_values(summary: ResponseSummary, left_out: int) -> dict[str, str]:
     for which in ("dead_time", "T86", "deviation"):
         values[f"{which} cause"] = summary.cause(which.lower()).name.lower()
     return values
+
+
+class StandstillWatch:
+    """Finds a seized stem without a ``stem_command``; satisfies `Watch`."""
+
+    def __init__(self, monitor: FrictionMonitor) -> None:
+        self._monitor = monitor
+        self._travel = math.nan
+        self._counter: StandstillCounter | None = None
+
+    def take(self, arrivals: Arrivals) -> None:
+        """Follow pressure and stem, where the travel is known."""
+        valve = self._monitor.settings.valve
+        if valve.travel != self._travel:
+            self._travel = valve.travel
+            self._counter = StandstillCounter(valve.travel) if math.isfinite(valve.travel) else None
+        if self._counter is None:
+            return
+        pressure, position = arrivals.samples(Kind.PRESSURE), arrivals.samples(Kind.POSITION)
+        in_range = np.isfinite(pressure.values) & valve.sensor_reads(pressure.values)
+        known = np.isfinite(position.values)
+        self._counter.add(
+            Samples(pressure.stamps[in_range], pressure.values[in_range]),
+            Samples(position.stamps[known], position.values[known]),
+        )
+
+    def findings(self) -> Sequence[Finding]:
+        """Return that the stem is held, if it is, in service or in the latest test."""
+        still, baseline = self._standstill(), self._monitor.baseline
+        settings, found = self._monitor.settings, None
+        if still is not None and baseline is not None:
+            factor = settings.limits.error_ratio
+            found = standstill_finding(still, settings.valve, baseline, factor)
+        found = found or self._monitor.held
+        return [] if found is None else [found]
+
+    def values(self) -> Mapping[str, str]:
+        """Return since when the stem rests, and the static friction that this needs."""
+        still = self._standstill()
+        if still is None:
+            return {}
+        return {
+            "standstill since [time]": utc_second(still.since),
+            "standstill static_friction at least [N]": number_text(
+                still.least_friction(self._monitor.settings.valve)
+            ),
+        }
+
+    def _standstill(self) -> Standstill | None:
+        return None if self._counter is None else self._counter.standstill

@@ -7,13 +7,20 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The diagnostic status of a monitored valve."""
+"""What an identifier publishes of its valve: its status, and the latched topics."""
 
 import math
+import time
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
+from typing import Any
 
+import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64, Float64MultiArray, MultiArrayDimension, MultiArrayLayout
 
 from valve_friction_ros.health import (
     Diagnosis,
@@ -26,7 +33,7 @@ from valve_friction_ros.health import (
     dead_band,
     dead_band_half_width,
 )
-from valve_friction_ros.history import Trend
+from valve_friction_ros.history import HistoryEntry, Trend
 from valve_friction_ros.history.status_values import (
     baseline_values,
     exact_time,
@@ -34,7 +41,10 @@ from valve_friction_ros.history.status_values import (
     result_values,
     trend_values,
 )
-from valve_friction_ros.identification import SLIDING
+from valve_friction_ros.identification import SLIDING, UNITS, Result, Sweep
+from valve_friction_ros.nodes.plumbing.messages import time_message
+from valve_friction_ros.nodes.plumbing.polled_node import PolledNode
+from valve_friction_ros.nodes.plumbing.qos import LATCHED
 from valve_friction_ros.wording import Code, said, sentence
 
 _NO_VALUES: Mapping[str, str] = MappingProxyType({})
@@ -166,3 +176,144 @@ def _status(
         message=message,
         values=[KeyValue(key=key, value=value) for key, value in values.items()],
     )
+
+
+_FIGURES = (
+    "dead_band",
+    "friction_ratio",
+    "sliding_speed",
+    "fit",
+    "rms",
+    "threshold",
+    "sigma",
+    "r_squared",
+)
+
+
+_LOOKS_COST = 1e4
+"""Time between two looks for a subscriber over that of a look, which goes through the graph."""
+_FRICTIONS = (*UNITS, SLIDING)
+
+
+def _sweep_message(sweep: Sweep | None) -> Float64MultiArray:
+    """Table of a sweep: a row a threshold, the columns named in the label of the second axis.
+
+    Empty for a method without a sweep, so that an older latched sweep is replaced.
+    """
+    if sweep is None:
+        return Float64MultiArray()
+    columns: Mapping[str, np.ndarray] = {
+        "threshold": sweep.thresholds,
+        **sweep.estimates,
+        "sigma": sweep.sigma,
+        "r_squared": sweep.r_squared,
+        "samples": sweep.samples.astype(np.float64),
+    }
+    table = np.column_stack([*columns.values()])
+    rows, width = table.shape
+    return Float64MultiArray(
+        layout=MultiArrayLayout(
+            dim=[
+                MultiArrayDimension(label="threshold", size=rows, stride=math.prod(table.shape)),
+                MultiArrayDimension(label=",".join(columns), size=width, stride=width),
+            ]
+        ),
+        data=table.ravel().tolist(),
+    )
+
+
+class EstimateTopic:
+    """Publishes what is known of the valve in one message, when it has changed.
+
+    It is on the graph once somebody subscribes to it. Without the parameter `estimate_topic` it
+    does nothing.
+    """
+
+    def __init__(self, node: PolledNode, is_wanted: bool) -> None:
+        self._node, self._is_wanted = node, is_wanted
+        self._topic = node.resolve_topic_name("~/estimate")
+        if is_wanted:
+            node.offered[self._topic] = "diagnostic_msgs/msg/DiagnosticStatus"
+        self._publisher: Publisher | None = None
+        self._last: DiagnosticStatus | None = None
+        self._look_at = -math.inf
+
+    def publish(self, status: DiagnosticStatus) -> None:
+        """Publish a status, unless it is the one before."""
+        if self._is_asked_for() and self._publisher is not None and status != self._last:
+            self._last = status
+            self._publisher.publish(status)
+
+    def _is_asked_for(self) -> bool:
+        """Return whether somebody subscribes, or did; that costs a ten-thousandth of a core."""
+        begun = time.monotonic()
+        if not self._is_wanted or self._publisher is not None or begun < self._look_at:
+            return self._publisher is not None
+        if self._node.count_subscribers(self._topic):
+            self._publisher = self._node.create_publisher(DiagnosticStatus, self._topic, LATCHED)
+            del self._node.offered[self._topic]
+        now = time.monotonic()
+        self._look_at = now + _LOOKS_COST * (now - begun)
+        return self._publisher is not None
+
+
+class NumberTopics:
+    """Publishes a result as numbers: all with a stamp, and each on a topic of its own.
+
+    The parameters `result_topic` and `number_topics` ask for them.
+    """
+
+    def __init__(self, node: Node) -> None:
+        self._result: Publisher | None = None
+        if node.get_parameter("result_topic").value:
+            self._result = node.create_publisher(JointState, "~/result", LATCHED)
+        self._numbers: list[tuple[str, str, Publisher]] = []
+        self._sweep: Publisher | None = None
+        if node.get_parameter("number_topics").value:
+            self._numbers = [
+                (kind, name, node.create_publisher(Float64, f"~/{kind}/{name}", LATCHED))
+                for kind, names in (
+                    ("friction", (*_FRICTIONS, *_FIGURES)),
+                    ("half_width", _FRICTIONS),
+                    ("published", UNITS),
+                )
+                for name in names
+            ]
+            self._sweep = node.create_publisher(Float64MultiArray, "~/sweep", LATCHED)
+
+    def publish(self, result: Result | HistoryEntry, monitor: FrictionMonitor) -> None:
+        """Publish a result that the monitor has accepted, or the numbers kept of an earlier one."""
+        ratio = monitor.diagnosis().ratio
+        unknown = float("nan")
+        if isinstance(result, Result):
+            evidence, fit, rms = result.evidence, result.fit, result.rms
+            sweep = None if result.estimate is None else result.estimate.sweep
+            if self._sweep is not None:
+                self._sweep.publish(_sweep_message(sweep))
+        else:
+            evidence, (fit, rms, _) = {}, result.fit
+        figures: dict[str, Any] = {
+            **dict.fromkeys(_FRICTIONS, unknown),
+            **result.values,
+            "dead_band": dead_band(result, monitor.settings.valve),
+            "friction_ratio": unknown if ratio is None else ratio.value,
+            "sliding_speed": result.sliding_speed,
+            "fit": fit,
+            "rms": rms,
+            **{name: evidence.get(name, unknown) for name in ("threshold", "sigma", "r_squared")},
+        }
+        known = result.parameters
+        half_widths = {name: known[name].half_width for name in _FRICTIONS if name in known}
+        published = {name: known[name].published for name in UNITS if name in known}
+        numbers = {"friction": figures, "half_width": half_widths, "published": published}
+        for kind, name, publisher in self._numbers:
+            publisher.publish(Float64(data=numbers[kind].get(name, unknown)))
+        if self._result is not None:
+            names = (*_FRICTIONS, *_FIGURES)
+            message = JointState(
+                name=list(names),
+                position=[figures[name] for name in names],
+                effort=[half_widths.get(name, unknown) for name in names],
+            )
+            message.header.stamp = time_message(monitor.seen_until or 0)
+            self._result.publish(message)

@@ -114,7 +114,7 @@ class UsageWatch:
             self._keep()
         if self._counter is None:
             return {"usage": "not counted, as the travel is not finite: set travel"}
-        used, everything, travel = self._since_renewal, self._total, self._travel
+        used, everything = self._since_renewal, self._total
         at_travel = self._node.get_parameter("air_to").value == "close"
         values = {
             "packing_renewed [date]": utc_day(self._renewal) if self._renewal else "not known",
@@ -122,7 +122,7 @@ class UsageWatch:
             "travelled_distance in all [m]": number_text(everything.distance),
             "reversals": str(used.reversals),
             "reversals in all": str(everything.reversals),
-            "strokes": number_text(used.strokes(travel)),
+            "strokes": number_text(used.strokes(self._monitor.settings.valve.travel)),
             "breakaways": str(used.breakaways),
             "time_watched [s]": number_text(used.time_watched / 1e9),
             "time_watched in all [s]": number_text(everything.time_watched / 1e9),
@@ -177,10 +177,6 @@ class UsageWatch:
         """Write what is counted; the writer's thread finishes it."""
         self._gather(is_end=True)
         self._keep()
-
-    @property
-    def _travel(self) -> float:
-        return self._monitor.settings.valve.travel
 
     def limits(self) -> tuple[LimitState, ...]:
         """Return how far the packing is from its limits; what has warned goes on warning."""

@@ -16,11 +16,10 @@ from collections.abc import Callable, Sequence
 from sensor_msgs.msg import FluidPressure, JointState
 from std_msgs.msg import Float64MultiArray
 
-from valve_friction_ros.nodes.plumbing.messages import rows_of
+from valve_friction_ros.nodes.plumbing.messages import arrivals_of, readable, rows_of
 from valve_friction_ros.nodes.plumbing.polled_node import PolledNode
 from valve_friction_ros.nodes.plumbing.polled_subscription import PolledSubscription, TakenMessage
 from valve_friction_ros.nodes.plumbing.qos import blocks, stream
-from valve_friction_ros.nodes.plumbing.raw_samples import arrivals_of, readable
 from valve_friction_ros.records.bags.topics import StreamNames
 from valve_friction_ros.streams import Arrivals, Losses, Signal
 
@@ -162,10 +161,9 @@ class ValveInputs:
 
     def is_played(self) -> bool:
         """Return whether a recording is played on the topics in use; it asks the middleware."""
-        used = (self._blocks,) if self._is_fed_by_blocks() else (self._pressure, self._stem)
         return any(
             publisher.node_name == _PLAYER
-            for one in used
+            for one in self._used()
             for publisher in self._node.get_publishers_info_by_topic(one.watch.topic)
         )
 
@@ -189,13 +187,13 @@ class ValveInputs:
         A valve that is fed by blocks needs no topics, and one that has topics needs no blocks.
         """
         found = [] if self._bad_block is None else [self._bad_block]
-        used = (self._blocks,) if self._is_fed_by_blocks() else (self._pressure, self._stem)
-        problems = [one.watch.problem(timeout) for one in used]
+        problems = [one.watch.problem(timeout) for one in self._used()]
         problems += [one.loss_problem() for one in (self._pressure, self._stem, self._blocks)]
         return found + [problem for problem in problems if problem is not None]
 
-    def _is_fed_by_blocks(self) -> bool:
-        """Return whether the last samples came in blocks, or only blocks are offered."""
-        since_topics = min(self._pressure.watch.silence(), self._stem.watch.silence())
-        blocks_watch = self._blocks.watch
-        return blocks_watch.silence() <= since_topics and blocks_watch.is_used()
+    def _used(self) -> tuple[_Input, ...]:
+        """Return the blocks where the last samples came in them, or only they are offered."""
+        topics, blocks = (self._pressure, self._stem), self._blocks.watch
+        since_topics = min(one.watch.silence() for one in topics)
+        is_fed_by_blocks = blocks.silence() <= since_topics and blocks.is_used()
+        return (self._blocks,) if is_fed_by_blocks else topics

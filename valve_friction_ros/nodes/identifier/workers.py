@@ -7,21 +7,33 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The threads of an identifier, which the identifiers of one process share."""
+"""The threads that the identifiers of one process share, and the identifications in them."""
 
 import contextlib
 import time
-from collections.abc import Iterator
+from collections.abc import Awaitable, Callable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
+from rclpy.callback_groups import CallbackGroup
+from rclpy.node import Node
+from rclpy.timer import Timer
+
 from valve_friction_ros.alerts import AlertSender
-from valve_friction_ros.health import DigestDesk
+from valve_friction_ros.health import (
+    DigestDesk,
+    FrictionMonitor,
+    IdentificationInput,
+    RefusedRecordError,
+    identify_with_numbers,
+)
 from valve_friction_ros.history import HistoryError
+from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.identification.methods import compile_methods
 from valve_friction_ros.model.compiled import find_cache, note_cache
+from valve_friction_ros.nodes.identifier.status import NumberTopics
 from valve_friction_ros.nodes.plumbing.processes import Processes, ThisProcess
-from valve_friction_ros.nodes.plumbing.worker import Worker
+from valve_friction_ros.nodes.plumbing.worker import InternalError, Worker, bugs_reported, done_in
 
 _AT_ONCE = 2
 """Identifications at once: a long record of one valve does not keep the others waiting."""
@@ -108,3 +120,159 @@ def running_workers(processes: int = 0) -> Iterator[Workers]:
         for worker in (workers.identify, workers.files, workers.evidence):
             worker.shutdown(wait=False, cancel_futures=True)
         apart.end()
+
+
+class Identification:
+    """Identifies what the monitor's buffer holds, and publishes the result.
+
+    The worker gets a copy of the buffer. Its callback awaits the result, so the executor's thread
+    alone touches the monitor.
+    """
+
+    def __init__(
+        self, node: Node, monitor: FrictionMonitor, results: NumberTopics, workers: Workers
+    ) -> None:
+        self._node, self._monitor, self._results, self._workers = node, monitor, results, workers
+        self._is_running = False
+        self._until: int | None = None
+        self._last_stamps: tuple[int | None, int | None] = (None, None)
+        self._came = [0, 0]
+
+    def follow(self) -> None:
+        """Note when usable samples of either signal have come, by the node's clock.
+
+        Stamps tell no age: those of a bag that is played without its clock are of another day.
+        """
+        now, last_stamps = (
+            self._node.get_clock().now().nanoseconds,
+            self._monitor.buffer.last_stamps,
+        )
+        for signal, (before, last) in enumerate(zip(self._last_stamps, last_stamps, strict=True)):
+            if last != before:
+                self._came[signal] = now
+        self._last_stamps = last_stamps
+
+    def _require_recent(self) -> None:
+        """Refuse a record of which a signal has ended longer ago than it may be silent."""
+        longest = max(
+            self._monitor.settings.window, self._node.get_parameter("input_timeout").value
+        )
+        now = self._node.get_clock().now().nanoseconds
+        for name, came, stamp in zip(
+            ("actuator_pressure", "stem_state"), self._came, self._last_stamps, strict=True
+        ):
+            age = (now - came) / 1e9
+            if stamp is not None and age > longest:
+                raise RefusedRecordError(
+                    f"the record is old: its last usable sample of {name} came {age:.0f} s ago, "
+                    f"and window and input_timeout allow {longest:g} s: check the source of {name}"
+                    ", or set a longer window for a sensor that reports rarely",
+                    {},
+                )
+
+    @property
+    def has_nothing_new(self) -> bool:
+        """Whether no sample has come since the last identification."""
+        newest = self._monitor.buffer.newest_stamp
+        return not self._is_running and newest is not None and newest == self._until
+
+    def record(self) -> IdentificationInput:
+        """Copy the buffer, to be identified.
+
+        Raises RefusalError if an identification is running.
+        """
+        if self._is_running:
+            raise RefusalError("an identification is already running: wait for it")
+        self._until = self._monitor.buffer.newest_stamp
+        return self._monitor.input()
+
+    async def run(self, record: IdentificationInput) -> None:
+        """Identify a record in the worker; take over and publish the result.
+
+        Raises RefusedRecordError if the record cannot be identified or is old, InternalError if a
+        bug is met; the monitor shows the bug until an identification succeeds. What a refused
+        record shows of the valve is taken over, too.
+        """
+        self._require_recent()
+        self._is_running = True
+        try:
+            with bugs_reported(self._node, known=self._monitor.internal_error):
+                workers = self._workers
+                result, numbers = await done_in(
+                    workers.identify,
+                    workers.apart.done,
+                    identify_with_numbers,
+                    record.snapshot,
+                    record.settings,
+                )
+                now = self._node.get_clock().now().nanoseconds
+                self._monitor.accept(result, now, numbers)
+                self._results.publish(result, self._monitor)
+                message = self._monitor.diagnosis().message
+                self._node.get_logger().info(f"identified: {message}")
+        except RefusedRecordError as refused:
+            self._monitor.learn(refused.numbers, self._node.get_clock().now().nanoseconds)
+            raise
+        except InternalError as error:
+            self._monitor.fail(str(error))
+            raise
+        finally:
+            self._is_running = False
+
+
+class Schedule:
+    """Calls for an identification by the node's clock, and remembers why the last was skipped.
+
+    A skip changes neither diagnosis nor level, and it is not logged. `group` is reentrant, so that
+    other callbacks run while an identification is awaited.
+    """
+
+    def __init__(
+        self, node: Node, identify: Callable[[], Awaitable[None]], group: CallbackGroup
+    ) -> None:
+        self._node = node
+        self._identify = identify
+        self._group = group
+        self._period = 0.0
+        self._timer: Timer | None = None
+        self._skip: tuple[str, int] | None = None
+        self.follow()
+
+    def follow(self) -> None:
+        """Follow the parameter."""
+        period = self._node.get_parameter("period").value
+        if period == self._period:
+            return
+        if self._timer is not None:
+            self._node.destroy_timer(self._timer)
+            self._timer = None
+        if period > 0:
+            self._timer = self._node.create_timer(
+                period, self._identify, callback_group=self._group
+            )
+        self._period, self._skip = period, None
+
+    def skip(self, reason: str) -> None:
+        """Remember that nothing was identified, and why.
+
+        What began before the schedule ended may end after it, and does not count.
+        """
+        if self._timer is not None:
+            self._skip = reason, self._node.get_clock().now().nanoseconds
+
+    def stall(self) -> None:
+        """Remember that nothing new has come; an older reason for a skip still holds."""
+        if self._skip is None:
+            self.skip("no new samples since the last identification")
+
+    def succeed(self) -> None:
+        """Forget the last skip."""
+        self._skip = None
+
+    def values(self) -> dict[str, str]:
+        """Return the values of the diagnostic for the last skip, if there was any."""
+        if self._skip is None:
+            return {}
+        reason, stamp = self._skip
+        age = (self._node.get_clock().now().nanoseconds - stamp) / 1e9
+        return {"scheduled_skip": reason, "scheduled_skip_age [s]": f"{age:.3f}"}

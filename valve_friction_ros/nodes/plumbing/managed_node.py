@@ -69,12 +69,23 @@ class ManagedNode(LifecycleNodeMixin, PolledNode):
         raise NotImplementedError
 
     def _configure(self) -> None:
-        self._before = {id(one) for one in self._entities()}
+        self._before = {id(one) for one, _ in self._entities()}
         self.configure()
         self.is_configured = True
 
-    def _entities(self) -> list[Any]:
-        return [*self.publishers, *self.subscriptions, *self.services, *self.timers, *self.clients]
+    def _entities(self) -> list[tuple[Any, Callable[[Any], object]]]:
+        """Return all publishers, services and so on, each with what destroys it."""
+        return [
+            (one, destroy)
+            for entities, destroy in (
+                (self.publishers, self.destroy_publisher),
+                (self.subscriptions, self.destroy_subscription),
+                (self.services, self.destroy_service),
+                (self.timers, self.destroy_timer),
+                (self.clients, self.destroy_client),
+            )
+            for one in entities
+        ]
 
     def close(self) -> None:
         """Close what is open; the end of a node in whatever state."""
@@ -84,17 +95,9 @@ class ManagedNode(LifecycleNodeMixin, PolledNode):
     def _dissolve(self) -> None:
         """Go back to what the node was before it was configured."""
         self.close()
-        made = {id(one) for one in self._entities()} - self._before
-        for entities, destroy in (
-            (self.publishers, self.destroy_publisher),
-            (self.subscriptions, self.destroy_subscription),
-            (self.services, self.destroy_service),
-            (self.timers, self.destroy_timer),
-            (self.clients, self.destroy_client),
-        ):
-            for one in [*entities]:
-                if id(one) in made and one is not self._poll_timer:
-                    destroy(one)
+        for one, destroy in self._entities():
+            if id(one) not in self._before and one is not self._poll_timer:
+                destroy(one)
 
     def create_timer(
         self, timer_period_sec: float, callback: Callable[..., Any], *arguments: Any, **named: Any

@@ -7,20 +7,28 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Conversion between messages and plain numbers."""
+"""Conversion between messages and plain numbers, also of serialised messages by the block.
 
-import math
-from collections.abc import Mapping, Sequence
+In the messages of a publisher only stamps and numbers change; frame, joint names and counts are the
+same bytes at the same places. So the first message shows where the numbers are, and NumPy reads
+them from all messages at once, if the other bytes are equal. Messages of different layouts are
+deserialised by rclpy.
+"""
+
+import struct
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from builtin_interfaces.msg import Time
 from numpy.typing import NDArray
-from sensor_msgs.msg import JointState
-from std_msgs.msg import Float64MultiArray, MultiArrayDimension, MultiArrayLayout
+from rclpy.serialization import deserialize_message
+from sensor_msgs.msg import FluidPressure, JointState
+from std_msgs.msg import Float64MultiArray
 
-from valve_friction_ros.identification import Sweep
-from valve_friction_ros.streams import Arrivals, rows_arrived
-from valve_friction_ros.streams.samples import joint_position
+from valve_friction_ros.nodes.plumbing.polled_subscription import TakenMessage
+from valve_friction_ros.streams import Arrivals, Kind, Samples, rows_arrived
+from valve_friction_ros.streams.samples import joint_index, joint_position
 
 _NANOSECONDS = 1_000_000_000
 
@@ -72,28 +80,153 @@ def _table_of(message: Float64MultiArray) -> tuple[NDArray[np.float64], list[str
     return table, columns.label.split(",")
 
 
-def sweep_message(sweep: Sweep | None) -> Float64MultiArray:
-    """Table of a sweep: a row a threshold, the columns named in the label of the second axis.
+_LITTLE_ENDIAN = b"\x00\x01"
+_BODY = 4
+"""First byte after the representation's header, from which alignment counts."""
+_STAMP = slice(_BODY, _BODY + 8)
+_DOUBLE = 8
 
-    Empty for a method without a sweep, so that an older latched sweep is replaced.
+
+class _Layout(NamedTuple):
+    """Where a message has its number, and which bytes up to there every message repeats."""
+
+    number: int
+    repeated: NDArray[np.bool_]
+
+
+class _Reader:
+    """Reads the beginning of a serialised message (CDR, little endian).
+
+    Raises struct.error or ValueError if the bytes are not a message.
     """
-    if sweep is None:
-        return Float64MultiArray()
-    columns: Mapping[str, np.ndarray] = {
-        "threshold": sweep.thresholds,
-        **sweep.estimates,
-        "sigma": sweep.sigma,
-        "r_squared": sweep.r_squared,
-        "samples": sweep.samples.astype(np.float64),
-    }
-    table = np.column_stack([*columns.values()])
-    rows, width = table.shape
-    return Float64MultiArray(
-        layout=MultiArrayLayout(
-            dim=[
-                MultiArrayDimension(label="threshold", size=rows, stride=math.prod(table.shape)),
-                MultiArrayDimension(label=",".join(columns), size=width, stride=width),
-            ]
-        ),
-        data=table.ravel().tolist(),
+
+    def __init__(self, message: bytes) -> None:
+        if message[:2] != _LITTLE_ENDIAN:
+            raise ValueError("not little endian")
+        self._message = message
+        self._at = _STAMP.stop
+        self._repeated = np.zeros(len(message), dtype=bool)
+        self._repeated[:2] = True
+
+    def _align(self, size: int) -> None:
+        self._at += -(self._at - _BODY) % size
+
+    def _take(self, size: int) -> bytes:
+        taken = slice(self._at, self._at + size)
+        self._repeated[taken] = True
+        self._at += size
+        return self._message[taken]
+
+    def count(self) -> int:
+        self._align(4)
+        number: int = struct.unpack("<I", self._take(4))[0]
+        return number
+
+    def string(self) -> str:
+        return self._take(self.count()).rstrip(b"\0").decode()
+
+    def double(self, index: int = 0) -> _Layout:
+        self._align(_DOUBLE)
+        number = self._at + _DOUBLE * index
+        if number + _DOUBLE > len(self._message):
+            raise ValueError("the message ends before its number")
+        return _Layout(number, self._repeated[:number])
+
+
+def _pressure_layout(message: bytes) -> _Layout:
+    reader = _Reader(message)
+    reader.string()
+    return reader.double()
+
+
+def _position_layout(message: bytes, joint: str) -> _Layout:
+    reader = _Reader(message)
+    reader.string()
+    names = [reader.string() for _ in range(reader.count())]
+    index = joint_index(names, reader.count(), joint)
+    if index is None:
+        raise ValueError("no position of the joint")
+    return reader.double(index)
+
+
+def _alike(
+    messages: Sequence[bytes], layout_of: Callable[[bytes], _Layout]
+) -> tuple[NDArray[np.int64], NDArray[np.float64]] | None:
+    """Return stamps and numbers of messages that are laid out alike, else None."""
+    try:
+        layout = layout_of(messages[0])
+    except (struct.error, ValueError):
+        return None
+    end = layout.number + _DOUBLE
+    joined = b"".join([message[:end] for message in messages])
+    if len(joined) != len(messages) * end:
+        return None
+    table = np.frombuffer(joined, np.uint8).reshape(-1, end)
+    repeated = np.flatnonzero(layout.repeated)
+    if (table[1:, repeated] != table[0, repeated]).any():
+        return None
+    seconds, nanoseconds = table[:, _STAMP].copy().view(np.dtype("<u4")).astype(np.int64).T
+    seconds = seconds.astype(np.int32).astype(np.int64)
+    values = table[:, layout.number : end].copy().view(np.dtype("<f8"))[:, 0]
+    return seconds * 1_000_000_000 + nanoseconds, values.astype(np.float64)
+
+
+def readable(taken: Sequence[TakenMessage], kind: type) -> list[TakenMessage]:
+    """Return those serialised messages that are of their type; anybody can publish other bytes."""
+
+    def is_readable(data: bytes) -> bool:
+        try:
+            deserialize_message(data, kind)
+        except RuntimeError:  # rclpy's
+            return False
+        return True
+
+    return [one for one in taken if is_readable(one.message)]
+
+
+def pressures_in(messages: Sequence[bytes]) -> Samples:
+    """Return the samples of serialised sensor_msgs/FluidPressure messages, Pa."""
+    if not messages:
+        return Samples.joined()
+    alike = _alike(messages, _pressure_layout)
+    if alike is not None:
+        return Samples(*alike)
+    read: list[Any] = [deserialize_message(message, FluidPressure) for message in messages]
+    return Samples(
+        np.array([stamp_of(message.header.stamp) for message in read], dtype=np.int64),
+        np.array([message.fluid_pressure for message in read], dtype=np.float64),
     )
+
+
+def positions_in(messages: Sequence[bytes], joint: str) -> Arrivals:
+    """Return what serialised sensor_msgs/JointState messages hold of `joint`, m."""
+    alike = _alike(messages, lambda one: _position_layout(one, joint)) if messages else None
+    if alike is not None:
+        return Arrivals(np.full(len(messages), Kind.POSITION, np.uint8), *alike)
+    read: list[Any] = [deserialize_message(message, JointState) for message in messages]
+    found = [position_of(message, joint) for message in read]
+    return Arrivals(
+        np.array([Kind.NO_POSITION if one is None else Kind.POSITION for one in found], np.uint8),
+        np.array([stamp_of(message.header.stamp) for message in read], dtype=np.int64),
+        np.array([np.nan if one is None else one for one in found], dtype=np.float64),
+    )
+
+
+def arrivals_of(
+    pressures: Sequence[TakenMessage], stems: Sequence[TakenMessage], joint: str
+) -> Arrivals:
+    """Return the samples of serialised messages of both topics, in the order of their receipt.
+
+    The messages are sensor_msgs/FluidPressure and sensor_msgs/JointState; an empty `joint` means
+    the first joint. Raises RuntimeError if one of them is no such message.
+    """
+    pressure = pressures_in([one.message for one in pressures])
+    stem = positions_in([one.message for one in stems], joint)
+    kinds = np.concatenate([np.full(len(pressures), Kind.PRESSURE, np.uint8), stem.kinds])
+    # Messages of a topic stay as they came, though the clock of their receipt may be set back.
+    receipts = [np.array([one.received for one in part], np.int64) for part in (pressures, stems)]
+    received = np.concatenate([np.maximum.accumulate(part) for part in receipts])
+    order = np.argsort(received, kind="stable")
+    stamps = np.concatenate([pressure.stamps, stem.stamps])
+    values = np.concatenate([pressure.values, stem.values])
+    return Arrivals(kinds[order], stamps[order], values[order])

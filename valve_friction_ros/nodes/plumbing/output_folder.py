@@ -12,13 +12,16 @@
 import contextlib
 import os
 import re
-from collections.abc import Iterator
+import shutil
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from itertools import count
 from pathlib import Path
 
 from rclpy.node import Node
 
 from valve_friction_ros.identification import RefusalError
+from valve_friction_ros.nodes.plumbing.worker import done_in
 from valve_friction_ros.records.data_folder import data_folder
 from valve_friction_ros.streams import utc
 
@@ -102,6 +105,37 @@ class OutputFolder:
             raise RefusalError(
                 f"cannot write {self._content} into {self._folder}: {cause}"
             ) from None
+
+    async def kept(
+        self,
+        node: Node,
+        stamp: int,
+        worker: ThreadPoolExecutor,
+        write: Callable[[Path, str], Path],
+    ) -> Path:
+        """Have something written in a thread of `worker`, if the node's valve has room for it.
+
+        `write` is given the folder and the name of a file at this time (ns), and returns the path.
+        Raises RefusalError, and removes what was written, if there is no room.
+        """
+        valve, name = valve_name(node), file_name(node, stamp)
+        room = 1e6 * node.get_parameter("save_megabytes").value
+
+        def write_within_room() -> Path:
+            with self.opened() as folder:
+                require_room(folder, valve, room)
+                path = write(folder, name)
+                try:
+                    require_room(folder, valve, room, is_there=True)
+                except RefusalError:
+                    if path.is_dir():
+                        shutil.rmtree(path)
+                    else:
+                        path.unlink()
+                    raise
+                return path
+
+        return await done_in(worker, write_within_room)
 
 
 def valve_name(node: Node) -> str:

@@ -157,13 +157,13 @@ def reject_invalid(
     def check(changes: list[Parameter]) -> SetParametersResult:
         if not any(parameter.name in names for parameter in changes):
             return SetParametersResult(successful=True)
-        if reason := _wrong_type(watched, changes):
-            return SetParametersResult(successful=False, reason=reason)
-        try:
-            build(values_of(node, watched, changes))
-        except ValueError as error:
-            return SetParametersResult(successful=False, reason=str(error))
-        return SetParametersResult(successful=True)
+        reason = _wrong_type(watched, changes)
+        if not reason:
+            try:
+                build(values_of(node, watched, changes))
+            except ValueError as error:
+                reason = str(error)
+        return SetParametersResult(successful=not reason, reason=reason)
 
     node.add_on_set_parameters_callback(check)
 

@@ -19,7 +19,7 @@ import inspect
 import threading
 import time
 import types
-from collections.abc import Callable, Coroutine, Generator, Iterator
+from collections.abc import Awaitable, Callable, Coroutine, Generator, Iterator
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -42,8 +42,10 @@ from rclpy.service import Service
 from rclpy.subscription import Subscription
 from rclpy.task import Task
 from rclpy.timer import Timer
+from std_srvs.srv import Trigger
 
 from valve_friction_ros.identification import RefusalError
+from valve_friction_ros.nodes.plumbing.qos import REQUESTS
 from valve_friction_ros.nodes.plumbing.rclpy_private import (
     awaits_coroutines,
     take_request,
@@ -58,6 +60,8 @@ _UNSET = ("null", "None")
 """What ``ros2 param`` makes of a parameter that is not set, in its file and in its request."""
 _POLL_PERIOD = 0.05
 """Time, s, from one look for messages to the next in an executor of rclpy's."""
+_STEP_PATIENCE = 1.0
+"""Time, s, that the end leaves to a step that a full queue of the middleware holds up."""
 
 
 class NeverReady(CallbackGroup):
@@ -86,11 +90,9 @@ class _TakenInTurns(CallbackGroup):
         self.has_turns = False
 
     def can_execute(self, entity: Any) -> bool:
-        """Return whether an executor may wait for a service."""
         return not (self.has_turns and takes_directly(entity))
 
     def beginning_execution(self, entity: Any) -> bool:
-        """Return whether an executor may run the callback of a service."""
         return self.can_execute(entity)
 
     def ending_execution(self, entity: object) -> None:
@@ -321,6 +323,44 @@ class PolledNode(Node):
         return None
 
 
+class PacedNode(PolledNode):
+    """A node that takes steps in a thread of its own, from its first turn to its end.
+
+    A loop that looks at its node every 20 ms sends what is due by then in a burst, of which a
+    subscriber with an ordinary queue of 10 hears a part. A bug in a step is logged once, and counts
+    among the `failures`.
+    """
+
+    def __init__(self, *arguments: Any, **named: Any) -> None:
+        super().__init__(*arguments, **named)
+        self._has_ended = False
+        self._thread = threading.Thread(target=self._take_steps, name="steps", daemon=True)
+
+    def step(self) -> float:
+        """Do what is due; return the time of the next step, s of the monotonic clock."""
+        raise NotImplementedError
+
+    def poll(self) -> None:
+        """Take steps from now on, if that has not begun."""
+        if self._thread.ident is None:
+            self._thread.start()
+
+    def close(self) -> None:
+        """Take no further step."""
+        self._has_ended = True
+        if self._thread.is_alive():
+            self._thread.join(_STEP_PATIENCE)
+
+    def _take_steps(self) -> None:
+        while not self._has_ended:
+            following = time.monotonic() + _STEP_PATIENCE
+            with self.guarded("step"):
+                following = self.step()
+            # An event that is waited for costs twice as much.
+            if (pause := following - time.monotonic()) > 0:
+                time.sleep(pause)
+
+
 @types.coroutine
 def _stepwise(
     work: Coroutine[Any, Any, Any], lock: contextlib.AbstractContextManager[Any]
@@ -373,14 +413,11 @@ class TurnExecutor(SingleThreadedExecutor):
         before = len(self._answers)
         for node in self.get_nodes():
             for service in node.services:
-                if isinstance(service.callback_group, _TakenInTurns) and takes_directly(service):
-                    self._take_request_of(node, service)
+                is_mine = isinstance(service.callback_group, _TakenInTurns)
+                # One at a time, as rclpy runs the newest of its tasks first.
+                if is_mine and takes_directly(service) and (found := take_request(service)):
+                    self._answers.append(self.create_task(_answer, node, service, *found))
         return len(self._answers) > before
-
-    def _take_request_of(self, node: Node, service: Service) -> None:
-        # One at a time, as rclpy runs the newest of its tasks first.
-        if (found := take_request(service)) is not None:
-            self._answers.append(self.create_task(_answer, node, service, *found))
 
     def _run_ready(self) -> None:
         """Run the tasks and the timers that are ready now."""
@@ -408,3 +445,46 @@ async def _answer(node: Node, service: Service, request: object, header: object)
     with _kept_to(node, service.srv_name):
         response = await await_or_execute(service.callback, request, service.srv_type.Response())
         service.send_response(response, header)
+
+
+def create_service(
+    node: PolledNode,
+    kind: type,
+    name: str,
+    work: Callable[[Any], Awaitable[str]],
+    failure: str = "",
+) -> None:
+    """Create a service whose answer is `success` and `message`, as those of std_srvs are.
+
+    The coroutine `work` is given the request. It returns the message of a success, or raises
+    RefusalError with the reason; anything else that it raises is answered as an internal error. A
+    refusal is logged behind the words of `failure`, if there are any.
+    """
+
+    async def answer(request: Any, response: Any) -> Any:
+        try:
+            if not node.is_active:
+                raise RefusalError(
+                    f"{node.get_fully_qualified_name()} is inactive: activate it, as by "
+                    f"`ros2 lifecycle set {node.get_fully_qualified_name()} activate`"
+                )
+            with bugs_reported(node):
+                response.message = await work(request)
+            response.success = True
+        except (RefusalError, InternalError) as error:
+            response.message = str(error)
+            if failure and isinstance(error, RefusalError):
+                node.get_logger().warning(f"{failure}: {error}")
+        return response
+
+    node.create_service(kind, name, answer, qos_profile=REQUESTS)
+
+
+def create_trigger_service(
+    node: PolledNode,
+    name: str,
+    work: Callable[[], Awaitable[str]],
+    failure: str = "",
+) -> None:
+    """Create a std_srvs/Trigger service (`create_service`)."""
+    create_service(node, Trigger, name, lambda _: work(), failure)

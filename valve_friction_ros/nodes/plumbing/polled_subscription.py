@@ -51,18 +51,13 @@ class TakenMessage(NamedTuple):
 
 
 class InputWatch:
-    """Says what is wrong with one subscribed topic; silence is real time, also with sim time."""
+    """Says what is wrong with one subscribed `topic`; silence is real time, also with sim time."""
 
     def __init__(self, node: Node, topic: str, type_name: str) -> None:
         self._node = node
-        self._topic, self._type = topic, type_name
+        self.topic, self._type = topic, type_name
         self._since = time.monotonic()
         self._has_arrived = False
-
-    @property
-    def topic(self) -> str:
-        """The topic, fully resolved."""
-        return self._topic
 
     def arrived(self) -> None:
         """Note that a message has come."""
@@ -75,14 +70,14 @@ class InputWatch:
 
     def is_used(self) -> bool:
         """Return whether a message has ever come, or the topic has a publisher."""
-        return self._has_arrived or self._node.count_publishers(self._topic) > 0
+        return self._has_arrived or self._node.count_publishers(self.topic) > 0
 
     def problem(self, timeout: float) -> str | None:
         """Say what is wrong if nothing has come for `timeout` seconds, else None."""
         silence = self.silence()
         if silence <= timeout:
             return None
-        publishers = self._node.get_publishers_info_by_topic(self._topic)
+        publishers = self._node.get_publishers_info_by_topic(self.topic)
         others = sorted({info.topic_type for info in publishers} - {self._type})
         if not publishers:
             cause = "nobody publishes it"
@@ -94,7 +89,7 @@ class InputWatch:
                 cause += (
                     f", or still waits for a node that was killed, for up to {_LEASE:g} s: wait"
                 )
-        return f"no data on {self._topic} for {silence:.1f} s: {cause}"
+        return f"no data on {self.topic} for {silence:.1f} s: {cause}"
 
 
 class PolledSubscription:

@@ -13,6 +13,7 @@ What identifies and what draws holds more memory than all the rest of a node, an
 """
 
 import contextlib
+import ctypes
 import os
 import pickle
 import queue
@@ -32,6 +33,31 @@ _Result = TypeVar("_Result")
 _KEPT = 10.0
 """Time, s, for which a process waits for more work. It holds some 240 MB, and its start takes a
 second of processor time."""
+
+
+_MALLOC = {-8: 2, -3: 131_072, -1: 131_072}
+"""M_ARENA_MAX, M_MMAP_THRESHOLD (bytes) and M_TRIM_THRESHOLD (bytes) of malloc.h."""
+
+
+def keep_little_memory() -> None:
+    """Let all threads share two arenas of glibc's memory, and give back what is free at once.
+
+    An arena a thread took the dashboard 50 MB more, and kept pages of the browser 10 MB. Large
+    arrays cost more time then. Elsewhere than with glibc nothing is done.
+    """
+    with contextlib.suppress(AttributeError, OSError):
+        mallopt = ctypes.CDLL(None).mallopt
+        for option, value in _MALLOC.items():
+            mallopt(option, value)
+
+
+def give_back_memory() -> None:
+    """Give back what is free now: after work that took much and is seldom done.
+
+    Elsewhere than with glibc nothing is done.
+    """
+    with contextlib.suppress(AttributeError, OSError):
+        ctypes.CDLL(None).malloc_trim(0)
 
 
 class ElsewhereError(Exception):

@@ -9,27 +9,13 @@
 
 """Quality of service of the topics, in one place."""
 
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
 
-
-def _kept_last(
-    depth: int,
-    durability: DurabilityPolicy = DurabilityPolicy.VOLATILE,
-    reliability: ReliabilityPolicy = ReliabilityPolicy.RELIABLE,
-) -> QoSProfile:
-    return QoSProfile(
-        history=HistoryPolicy.KEEP_LAST,
-        depth=depth,
-        reliability=reliability,
-        durability=durability,
-    )
-
-
-LATCHED = _kept_last(1, DurabilityPolicy.TRANSIENT_LOCAL)
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 """Results: a late subscriber receives the last one."""
 
-REQUESTS = _kept_last(100)
+REQUESTS = QoSProfile(depth=100)
 """Requests to a service, ten times as many as usual: they wait for the executor's next turn."""
 
 
@@ -39,12 +25,12 @@ def stream() -> QoSProfile:
     Deep enough for 20 s at 1 kHz while the receiver is busy. Every topic needs a profile of its
     own, because rclpy writes a topic's overrides into the profile that it is given.
     """
-    return _kept_last(20_000)
+    return QoSProfile(depth=20_000)
 
 
 def blocks() -> QoSProfile:
     """Return the quality of service of a stream of blocks: deep enough for 100 s at 10 Hz."""
-    return _kept_last(1_000)
+    return QoSProfile(depth=1_000)
 
 
 def statuses() -> QoSProfile:
@@ -53,7 +39,7 @@ def statuses() -> QoSProfile:
     Deep enough for 4 s of 500 valves while the receiver is busy. The middleware keeps the memory of
     the longest queue there was: at the depth of a stream that is 100 MB.
     """
-    return _kept_last(2_000)
+    return QoSProfile(depth=2_000)
 
 
 def watched() -> QoSProfile:
@@ -61,7 +47,7 @@ def watched() -> QoSProfile:
 
     It takes what is published either way, and holds no publisher up.
     """
-    return _kept_last(5_000, reliability=ReliabilityPolicy.BEST_EFFORT)
+    return QoSProfile(depth=5_000, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 
 def qos_overrides() -> QoSOverridingOptions:

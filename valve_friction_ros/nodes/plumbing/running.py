@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Starting and stopping nodes as a process."""
+"""Starting and stopping nodes as a process, which ends also where its loop is stuck."""
 
 import contextlib
 import faulthandler
@@ -31,7 +31,6 @@ from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import Empty
 
 from valve_friction_ros.nodes.plumbing.polled_node import PolledNode, TurnExecutor
-from valve_friction_ros.nodes.plumbing.stop_request import StopRequest
 from valve_friction_ros.nodes.plumbing.worker import Companion, workers_have_ended
 
 
@@ -47,7 +46,7 @@ def notify(state: str) -> None:
         sender.sendto(state.encode(), address)
 
 
-def watchdog_time() -> float | None:
+def _watchdog_time() -> float | None:
     """Return the time without ``WATCHDOG=1`` after which systemd acts, s; None if it does not."""
     with contextlib.suppress(KeyError, ValueError):
         if int(os.environ.get("WATCHDOG_PID", os.getpid())) == os.getpid():
@@ -63,7 +62,7 @@ _REPEAT = 1.0
 """Time between two messages, s."""
 
 
-class Watchdog(Companion):
+class _Watchdog(Companion):
     """Watches the loop of some nodes from a thread of its own, as long as the context lasts.
 
     systemd's watchdog is served as long as the loop turns and no node has overdue work. When the
@@ -79,25 +78,21 @@ class Watchdog(Companion):
         self._publisher: Publisher | None = None
         if any(node.stuck_status("") for node in nodes):
             self._publisher = nodes[0].create_publisher(DiagnosticArray, "/diagnostics", 10)
-        within = watchdog_time()
+        within = _watchdog_time()
         self._look = _LOOK if within is None else min(_LOOK, max(within / 4, 0.05))
         self._turns = 0
 
     def begin(self) -> None:
-        """Tell systemd that the nodes are there."""
         notify("READY=1")
 
     def end(self) -> None:
-        """Tell systemd that they end."""
         notify("STOPPING=1")
         self.thread.join(1.0)  # it may be within the middleware, which is to be shut down
 
     def turned(self) -> None:
-        """Note that the loop has turned."""
         self._turns += 1
 
     def run(self) -> None:
-        """Look again and again."""
         seen, idle = -1, 0
         allowed, each = round(LOOP_LIMIT / self._look), round(_REPEAT / self._look)
         while not self.has_ended.wait(self._look):
@@ -146,13 +141,12 @@ def arm(seconds: float = _LOOP_END) -> None:
     signal.setitimer(signal.ITIMER_REAL, seconds + _DUMP)  # its default is the end of the process
 
 
-def disarm() -> None:
-    """Let the process live."""
+def _disarm() -> None:
     faulthandler.cancel_dump_traceback_later()
     signal.setitimer(signal.ITIMER_REAL, 0.0)
 
 
-class Deadman:
+class _Deadman:
     """Ends the process of some nodes when its loop or the middleware hangs.
 
     Two things freeze a node for good, and no thread of Python can help in either. The loop may hang
@@ -170,7 +164,6 @@ class Deadman:
         self._armed = self._asked = time.monotonic()
 
     def goes_on(self) -> None:
-        """Note that the loop has done something."""
         now = time.monotonic()
         if now - self._armed >= _ARM:
             self._armed = now
@@ -216,6 +209,63 @@ _CLEAN_UP = 2.7
 _WORKERS_PATIENCE = 2.0
 """Time, s, that the end of the process leaves to what is being written."""
 
+_PATIENCE = 2.5
+"""Time, s, from the request to the end of the process at the latest."""
+_REQUESTS = (signal.SIGINT, signal.SIGTERM)
+
+
+class StopRequest(Companion):
+    """Whether Ctrl-C or SIGTERM has come, as long as the context lasts.
+
+    A handler that raised could strike within rclpy's own code, and rclpy's own handler shuts the
+    context down under a callback that is still publishing. So the request is only noted.
+
+    A loop that is stuck in foreign code never runs Python's handlers. Python writes each signal
+    into a socket even then, and a thread that reads there ends the process, if the context has not
+    ended by itself 2.5 s later.
+
+    Attributes
+    ----------
+    has_come : bool
+        Whether the loop shall end.
+    is_followed : bool
+        Set by the loop when it has ended, and only the clean-up is left.
+    """
+
+    def __init__(self) -> None:
+        super().__init__("stop")
+        self.has_come = self.is_followed = False
+        self._reader, self._writer = socket.socketpair()
+        self._writer.setblocking(False)
+
+    def begin(self) -> None:
+        """Take the signals."""
+        for request in _REQUESTS:
+            signal.signal(request, self._note)
+        self._before = signal.set_wakeup_fd(self._writer.fileno(), warn_on_full_buffer=False)
+
+    def end(self) -> None:
+        """Give the signals back."""
+        signal.set_wakeup_fd(self._before)
+        self._writer.close()  # ends the thread, if no request has come
+
+    def _note(self, *_: object) -> None:
+        self.has_come = True
+
+    def run(self) -> None:
+        """Wait for a request, then for the end."""
+        while number := self._reader.recv(1):
+            if number[0] in _REQUESTS:
+                break
+        if self.has_ended.wait(_PATIENCE) or not number:
+            return
+        if not self.is_followed:
+            line = f"stuck: it did not end within {_PATIENCE:g} s of the request, and is left so"
+            print(line, file=sys.stderr)  # noqa: T201
+            faulthandler.dump_traceback()
+        os._exit(0 if self.is_followed else 1)
+
+
 WRONG_REQUESTS = (NameValidationException, ParameterException, RuntimeError, ValueError)
 """What rclpy and the nodes raise where arguments, parameters or quality of service are wrong."""
 
@@ -237,7 +287,6 @@ class _Answering:
         self._looked = time.monotonic()
 
     def go_on(self) -> None:
-        """Answer what is asked, if the last look is long ago."""
         if time.monotonic() > self._looked + _LONGEST_WAIT:
             for executor in self._executors:
                 executor.answer()
@@ -249,10 +298,9 @@ def _run(
     executors: Sequence[TurnExecutor],
     pause: float,
     stop: StopRequest,
-    watchdog: Watchdog,
-    deadman: Deadman,
+    watchdog: _Watchdog,
+    deadman: _Deadman,
 ) -> None:
-    """Take turns until the stop is requested."""
     least = _PAUSE_OF_A_NODE * len(nodes)
     lively_until = time.monotonic() + _LIVELY_TIME
     while not _is_over(stop):
@@ -328,7 +376,7 @@ def _run_until(
     try:
         join_graph(arguments)
     except WRONG_REQUESTS as error:
-        disarm()
+        _disarm()
         return cannot_start(error)
     try:
         try:
@@ -344,15 +392,15 @@ def _run_until(
                 executors[node.context] = TurnExecutor(context=node.context)
             executors[node.context].add_node(node)
         polled = [node for node in nodes if isinstance(node, PolledNode)]
-        with Watchdog(polled) as watchdog:
-            _run(polled, [*executors.values()], pause, stop, watchdog, Deadman(polled))
+        with _Watchdog(polled) as watchdog:
+            _run(polled, [*executors.values()], pause, stop, watchdog, _Deadman(polled))
     except ExternalShutdownException:
         pass
     finally:
         stop.is_followed = True
         arm(_CLEAN_UP)
         _close(nodes, executors)
-        disarm()
+        _disarm()
     return 0
 
 
