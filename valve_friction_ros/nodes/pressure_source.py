@@ -155,7 +155,6 @@ class PressureSource(PacedNode):
         return begun + min(max(following, _TICK), _WAITING)
 
     def _publish(self) -> None:
-        """Publish the next sample."""
         if not self._ready:
             self._compute()
         nanoseconds, self._message.fluid_pressure = self._ready.popleft()

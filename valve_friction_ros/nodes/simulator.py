@@ -13,7 +13,7 @@ import sys
 import time
 from collections import deque
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from sensor_msgs.msg import FluidPressure, JointState
@@ -62,18 +62,10 @@ _PARAMETERS = NODES["simulator"]
 _CHANGEABLE = tuple(one for one in _PARAMETERS if not one.read_only)
 
 
-class _Plant(NamedTuple):
-    valve: Valve
-    parameters: KarnoppParameters
-    position_noise: float
-
-
-def _plant(values: Mapping[str, Any]) -> _Plant:
-    return _Plant(
-        valve_from(values),
-        karnopp_parameters_from(values),
-        require_non_negative("position_noise", values["position_noise"]),
-    )
+def _plant(values: Mapping[str, Any]) -> tuple[Valve, KarnoppParameters, float]:
+    """Return the valve, its model and the noise of the position."""
+    valve, parameters = valve_from(values), karnopp_parameters_from(values)
+    return valve, parameters, require_non_negative("position_noise", values["position_noise"])
 
 
 class Simulator(PacedNode):

@@ -21,7 +21,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from queue import SimpleQueue
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import rclpy
@@ -103,7 +103,6 @@ class _Watch:
         self.streams = ()
 
     def end(self) -> None:
-        """End the subscriptions."""
         self._destroy()
         self.sources = Sources()
 
@@ -182,26 +181,18 @@ _PATIENCE = 600.0
 """Longest time until an answer, s."""
 
 
-class _Asked(NamedTuple):
-    """A call that a page waits for."""
-
-    node: str
-    request: ServiceRequest
-    answer: "Future[Answer]"
-
-
 class ServiceCalls:
     """Calls services for pages: they ask in their thread, and the node's thread calls."""
 
     def __init__(self) -> None:
-        self._asked: SimpleQueue[_Asked] = SimpleQueue()
+        self._asked: SimpleQueue[tuple[str, ServiceRequest, Future[Answer]]] = SimpleQueue()
         self._under_way: list[tuple[TriggerCall, Future[Answer]]] = []
 
     async def call(self, node: str, request: ServiceRequest) -> Answer:
         """Call a service of an identifier and wait for its answer; any thread's event loop."""
         answer: Future[Answer] = Future()
         answer.set_running_or_notify_cancel()
-        self._asked.put(_Asked(node, request, answer))
+        self._asked.put((node, request, answer))
         return await asyncio.shield(asyncio.wrap_future(answer))
 
     def rest(self, node: Node) -> None:
@@ -215,10 +206,9 @@ class ServiceCalls:
     def step(self, node: Node) -> None:
         """Go on with all calls; in the node's thread."""
         while not self._asked.empty():
-            asked = self._asked.get_nowait()
-            name, values, switch = asked.request
-            call = TriggerCall(node, asked.node, name, _MEETING, _PATIENCE, values, switch)
-            self._under_way.append((call, asked.answer))
+            identifier, (name, values, switch), answer = self._asked.get_nowait()
+            call = TriggerCall(node, identifier, name, _MEETING, _PATIENCE, values, switch)
+            self._under_way.append((call, answer))
         self._under_way = [one for one in self._under_way if not _has_ended(*one)]
 
 

@@ -99,7 +99,6 @@ class AlarmBoard:
         }
         self._identified: int | None = None
         self._under_way: _Step | None = None
-        self._changed: list[AlarmEvent] = []
         if not node.tells_parameters:
             return  # who asks is a parameter
         for name, action in (
@@ -115,11 +114,6 @@ class AlarmBoard:
     def alarms(self) -> Mapping[AlarmKind, Alarm]:
         """The alarms by kind; one that was never raised is not there."""
         return self._alarms
-
-    def news(self) -> list[AlarmEvent]:
-        """Return the events since the last call."""
-        found, self._changed = self._changed, []
-        return found
 
     def _condition(self, kind: AlarmKind) -> Condition:
         return self._alarms[kind].condition if kind in self._alarms else NO_CONDITION
@@ -168,7 +162,6 @@ class AlarmBoard:
 
     def _take(self, events: Sequence[AlarmEvent]) -> None:
         self._alarms |= {one.alarm.kind: one.alarm for one in events}
-        self._changed += events
         for one in events:
             by = f" by {one.who}" if one.who else ""
             said = one.text or (one.alarm.message if one.alarm.is_active else "")

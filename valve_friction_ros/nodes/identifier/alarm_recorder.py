@@ -293,7 +293,6 @@ class AlarmRecorder:
         return most, 1e6 * self._parameter("alarm_megabytes")
 
     def _settle(self) -> None:
-        """Take the outcome of what was written, if it has ended."""
         if self._first is not None and self._first.done():
             first, self._first = self._first, None
             with self._trouble_told("the alarm was not recorded"):
@@ -325,7 +324,6 @@ class AlarmRecorder:
             self._write_page(recording.path)
 
     def _keep(self, recording: AlarmRecording) -> None:
-        """Keep in the history that the alarm was recorded."""
         valve, days = self._history.valve, self._parameter("history_days")
         self._history.keep_soon(
             lambda file: database.keep_alarm_recording(file, valve, recording, days)

@@ -180,7 +180,6 @@ class Alerts:
             self._outbox.put(letter)
 
     def _keep(self, level: Level) -> None:
-        """Keep the level that was told last, unless it is kept."""
         if level != self._kept:
             self._kept = level
             self._history.keep_told_level(level)

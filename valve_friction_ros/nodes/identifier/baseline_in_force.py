@@ -194,7 +194,6 @@ class BaselineInForce:
         return answer
 
     def _put_in_force(self, baseline: Baseline | None) -> None:
-        """Compare with this baseline from now on."""
         value = _value(baseline)
         shown = math.nan if value is None else value
         self._node.set_parameters([Parameter(_PARAMETER, value=shown)])

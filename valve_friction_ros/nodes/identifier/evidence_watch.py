@@ -440,7 +440,6 @@ class EvidenceWatch:
             self._job = self._worker.submit(evidence_of, *wanted)
 
     def _settle(self) -> None:
-        """Take what the thread has found, if it has."""
         if self._job is None or not self._job.done():
             return
         job, self._job = self._job, None

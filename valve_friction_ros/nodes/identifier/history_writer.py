@@ -493,7 +493,6 @@ class HistoryWriter:
         return lambda file, name: database.current_trend(file, name, baseline, settings)
 
     async def _written(self, change: _Change, identification: bool = False) -> None:
-        """Write a change, and what waits since before; then compute the trend."""
         if self._file is None:
             return
         self._waiting.add(change, identification)

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The answer of the stem to ``stem_command``, watched in service."""
+"""Whether the stem follows in service: its pressure, and ``stem_command``."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -115,7 +115,6 @@ class ResponseWatch:
         return self._monitor
 
     def _drop(self) -> None:
-        """Drop what was gathered."""
         self._commands: list[Samples] = []
         self._arrivals: list[Arrivals] = []
         self._held = 0

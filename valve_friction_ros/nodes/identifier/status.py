@@ -240,21 +240,22 @@ class EstimateTopic:
 
     def publish(self, status: DiagnosticStatus) -> None:
         """Publish a status, unless it is the one before."""
-        if self._is_asked_for() and self._publisher is not None and status != self._last:
+        if self._is_wanted and self._publisher is None:
+            self._look_for_subscriber()
+        if self._publisher is not None and status != self._last:
             self._last = status
             self._publisher.publish(status)
 
-    def _is_asked_for(self) -> bool:
-        """Return whether somebody subscribes, or did; that costs a ten-thousandth of a core."""
+    def _look_for_subscriber(self) -> None:
+        """Make the publisher once somebody subscribes; that costs a ten-thousandth of a core."""
         begun = time.monotonic()
-        if not self._is_wanted or self._publisher is not None or begun < self._look_at:
-            return self._publisher is not None
+        if begun < self._look_at:
+            return
         if self._node.count_subscribers(self._topic):
             self._publisher = self._node.create_publisher(DiagnosticStatus, self._topic, LATCHED)
             del self._node.offered[self._topic]
         now = time.monotonic()
         self._look_at = now + _LOOKS_COST * (now - begun)
-        return self._publisher is not None
 
 
 class NumberTopics:

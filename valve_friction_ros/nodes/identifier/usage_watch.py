@@ -226,13 +226,11 @@ class UsageWatch:
         self._remember_warnings()
 
     def _add_up(self) -> None:
-        """Find the sums and the pace from the days."""
         usage = self.usage()
         self._total, self._since_renewal = usage.total, usage.since_renewal
         self._pace = usage.pace()
 
     def _keep(self) -> None:
-        """Have the writer's thread write what has changed."""
         self._gather()
         self._written_at = time.monotonic()
         for key, one in self._written.items():
@@ -244,7 +242,6 @@ class UsageWatch:
             self._history.keep_soon(self._write)
 
     def _condense(self) -> None:
-        """Hold old days as sums."""
         if len(self._own) > _MOST_DAYS and self._earlier is not None:
             old = [key for key in self._own if key not in self._unwritten][: -_MOST_DAYS // 2]
             days = [UsedDay(day, renewal, self._own[renewal, day]) for renewal, day in old]

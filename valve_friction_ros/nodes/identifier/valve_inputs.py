@@ -138,7 +138,6 @@ class ValveInputs:
     def _readable(
         self, signal: Signal, taken: Sequence[TakenMessage], kind: type
     ) -> list[TakenMessage]:
-        """Drop what is no message of the topic's type."""
         found = readable(taken, kind)
         if len(found) < len(taken):
             self._drop(signal, len(taken) - len(found))

@@ -143,10 +143,8 @@ class Identification:
 
         Stamps tell no age: those of a bag that is played without its clock are of another day.
         """
-        now, last_stamps = (
-            self._node.get_clock().now().nanoseconds,
-            self._monitor.buffer.last_stamps,
-        )
+        now = self._node.get_clock().now().nanoseconds
+        last_stamps = self._monitor.buffer.last_stamps
         for signal, (before, last) in enumerate(zip(self._last_stamps, last_stamps, strict=True)):
             if last != before:
                 self._came[signal] = now

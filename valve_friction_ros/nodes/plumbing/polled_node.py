@@ -67,43 +67,28 @@ _STEP_PATIENCE = 1.0
 class NeverReady(CallbackGroup):
     """A callback group from which no executor waits for anything."""
 
-    def can_execute(self, entity: object) -> bool:  # noqa: ARG002 - rclpy's signature
+    def can_execute(self, entity: Any) -> bool:  # noqa: ARG002 - rclpy's signature
         """Return False."""
         return False
 
-    def beginning_execution(self, entity: object) -> bool:  # noqa: ARG002
-        """Return False."""
-        return False
+    def beginning_execution(self, entity: Any) -> bool:
+        """Return whether an executor may run the callback of what it has waited for."""
+        return self.can_execute(entity)
 
-    def ending_execution(self, entity: object) -> None:
-        """Do nothing: nothing has begun."""
+    def ending_execution(self, entity: Any) -> None:
+        """Do nothing: others may begin at any time."""
 
 
-class _TakenInTurns(CallbackGroup):
+class _TakenInTurns(NeverReady):
     """The callback group of services: a `TurnExecutor` takes their requests, others wait for them.
 
     Callbacks that are awaiting something let others run, and the node's lock keeps them apart.
     """
 
-    def __init__(self) -> None:
-        super().__init__()
-        self.has_turns = False
+    has_turns = False
 
     def can_execute(self, entity: Any) -> bool:
         return not (self.has_turns and takes_directly(entity))
-
-    def beginning_execution(self, entity: Any) -> bool:
-        return self.can_execute(entity)
-
-    def ending_execution(self, entity: object) -> None:
-        """Do nothing: others may begin at any time."""
-
-
-class _Silence:
-    """In place of a publisher: nothing is published."""
-
-    def publish(self, message: object) -> None:
-        pass
 
 
 class PolledNode(Node):
@@ -190,7 +175,7 @@ class PolledNode(Node):
         Nobody is told of the parameters of a node that has no services for them.
         """
         if topic == "/parameter_events" and not self.tells_parameters:
-            return _Silence()
+            return types.SimpleNamespace(publish=lambda _: None)
         named.setdefault("event_callbacks", PublisherEventCallbacks(use_default_callbacks=False))
         return super().create_publisher(kind, topic, *arguments, **named)
 
@@ -420,7 +405,6 @@ class TurnExecutor(SingleThreadedExecutor):
         return len(self._answers) > before
 
     def _run_ready(self) -> None:
-        """Run the tasks and the timers that are ready now."""
         has_run = False
 
         def is_done() -> bool:  # ends the look when all that was ready has run

@@ -108,7 +108,6 @@ class _Child:
         return pickle.loads(pickle.load(process.stdout))  # noqa: S301 - of this package's process
 
     def end(self) -> None:
-        """End it: nobody waits for it any more."""
         self._process.kill()
         with contextlib.suppress(OSError):  # it has ended with something left to read
             self._process.communicate()

@@ -192,7 +192,8 @@ class _Deadman:
 
 _PAUSE = 0.1
 _LIVELY_PAUSE = 0.02
-"""Times between two turns, s: while nothing is asked, and while services are in use."""
+"""Times between two turns, s: while nothing is asked, and while services are in use. For so long
+messages gather, and a first request waits."""
 _LIVELY_TIME = 2.0
 """Time, s, for which services count as in use after the start and after each answer."""
 _LONGEST_WAIT = 0.2
@@ -279,39 +280,33 @@ def cannot_start(error: Exception) -> int:
     return 2
 
 
-class _Answering:
-    """Looks at the services also within a turn that has just begun, where it lasts."""
-
-    def __init__(self, executors: Sequence[TurnExecutor]) -> None:
-        self._executors = executors
-        self._looked = time.monotonic()
-
-    def go_on(self) -> None:
-        if time.monotonic() > self._looked + _LONGEST_WAIT:
-            for executor in self._executors:
-                executor.answer()
-            self._looked = time.monotonic()
-
-
 def _run(
     nodes: Sequence[PolledNode],
     executors: Sequence[TurnExecutor],
-    pause: float,
     stop: StopRequest,
     watchdog: _Watchdog,
     deadman: _Deadman,
 ) -> None:
+
+    def answered(looked: float) -> float:
+        """Look at the services also within a turn, where it lasts; return when that was last."""
+        if time.monotonic() <= looked + _LONGEST_WAIT:
+            return looked
+        for executor in executors:
+            executor.answer()
+        return time.monotonic()
+
     least = _PAUSE_OF_A_NODE * len(nodes)
     lively_until = time.monotonic() + _LIVELY_TIME
     while not _is_over(stop):
-        is_lively, answering = False, _Answering(executors)
+        is_lively, looked = False, time.monotonic()
         for executor in executors:
             is_lively |= executor.turn()
-            answering.go_on()
+            looked = answered(looked)
             deadman.goes_on()
         for node in nodes:
             node.poll_guarded()
-            answering.go_on()
+            looked = answered(looked)
             # Where hundreds of nodes get little of a core, their whole turn may last long.
             watchdog.turned()
             deadman.goes_on()
@@ -321,7 +316,7 @@ def _run(
         now = time.monotonic()
         if is_lively:
             lively_until = now + _LIVELY_TIME
-        time.sleep(max(least, min(pause, _LIVELY_PAUSE) if now < lively_until else pause))
+        time.sleep(max(least, _LIVELY_PAUSE if now < lively_until else _PAUSE))
 
 
 def _is_over(stop: StopRequest) -> bool:
@@ -333,17 +328,12 @@ def join_graph(arguments: Sequence[str] | None, context: Context | None = None) 
     rclpy.init(args=arguments, context=context, signal_handler_options=SignalHandlerOptions.NO)
 
 
-def run_nodes(
-    create: Callable[[], Iterable[Node]],
-    arguments: Sequence[str] | None = None,
-    pause: float = _PAUSE,
-) -> int:
+def run_nodes(create: Callable[[], Iterable[Node]], arguments: Sequence[str] | None = None) -> int:
     """Run nodes in one process until Ctrl-C, SIGTERM or shutdown; return the exit code.
 
     It is 0 after a clean stop, and 2 if arguments or parameters do not let the nodes start: what
     they or rclpy refuse is written to stderr in one line. The ROS arguments are those of the
-    process by default. The `pause` is the time between two turns, s, while no service is in use:
-    for so long messages gather, and a first request waits.
+    process by default.
 
     Where a worker is still busy at the end, the process ends here, without it. Where the loop or
     the middleware hangs for good, the process ends with exit code 1.
@@ -351,7 +341,7 @@ def run_nodes(
     sys.setswitchinterval(_SWITCH)
     with StopRequest() as stop:
         try:
-            exit_code = _run_until(stop, create, arguments, pause)
+            exit_code = _run_until(stop, create, arguments)
         except Exception:  # noqa: BLE001 - Python's own end would wait for the workers
             traceback.print_exc()
             exit_code = 1
@@ -365,10 +355,7 @@ def run_nodes(
 
 
 def _run_until(
-    stop: StopRequest,
-    create: Callable[[], Iterable[Node]],
-    arguments: Sequence[str] | None,
-    pause: float,
+    stop: StopRequest, create: Callable[[], Iterable[Node]], arguments: Sequence[str] | None
 ) -> int:
     nodes: list[Node] = []
     executors: dict[Context, TurnExecutor] = {}
@@ -393,7 +380,7 @@ def _run_until(
             executors[node.context].add_node(node)
         polled = [node for node in nodes if isinstance(node, PolledNode)]
         with _Watchdog(polled) as watchdog:
-            _run(polled, [*executors.values()], pause, stop, watchdog, _Deadman(polled))
+            _run(polled, [*executors.values()], stop, watchdog, _Deadman(polled))
     except ExternalShutdownException:
         pass
     finally:
@@ -422,8 +409,6 @@ def _close(nodes: Sequence[Node], executors: Mapping[Context, TurnExecutor]) -> 
     rclpy.try_shutdown()
 
 
-def run_node(
-    create: Callable[[], Node], arguments: Sequence[str] | None = None, pause: float = _PAUSE
-) -> int:
+def run_node(create: Callable[[], Node], arguments: Sequence[str] | None = None) -> int:
     """Run one node, as `run_nodes` does."""
-    return run_nodes(lambda: [create()], arguments, pause)
+    return run_nodes(lambda: [create()], arguments)
