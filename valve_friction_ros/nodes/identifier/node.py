@@ -495,9 +495,10 @@ class Identifier(ManagedNode):
         findings = [finding for some in found.values() for finding in some]
         faults = self._faults()
         unusable = [*self._silence(), *map(sentence, faults.values())]
+        of_data = [*unusable, *map(str, filter(None, [self._monitor.refusals_problem]))]
         self._board.follow(
             {kind: found[watch] for kind, watch in self._watch_of.items()},
-            [*unusable, *map(str, filter(None, [self._monitor.refusals_problem]))],
+            of_data,
             self._usage.usage().renewal,
             time.monotonic(),
         )
@@ -518,12 +519,7 @@ class Identifier(ManagedNode):
             estimate,
             self._monitor,
             now.nanoseconds,
-            [
-                *filter(None, [self.overdue()]),
-                *self._evidence.problems,
-                *unusable,
-                *map(str, filter(None, [self._monitor.refusals_problem])),
-            ],
+            [*filter(None, [self.overdue()]), *self._evidence.problems, *of_data],
             upkeep,
             {
                 **{key: value for one in self._watches for key, value in one.values().items()},
