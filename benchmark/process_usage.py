@@ -12,8 +12,6 @@
 import os
 from pathlib import Path
 
-__all__ = ["processor_seconds", "proportional_megabytes", "resident_megabytes"]
-
 _TICKS, _PAGE = os.sysconf("SC_CLK_TCK"), os.sysconf("SC_PAGE_SIZE")
 
 

@@ -7,24 +7,4 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""A ROS domain of this machine that nobody else uses."""
-
-import contextlib
-import os
-from collections.abc import Iterator
-
-from valve_friction_ros.commands.demo.bench import free_domain
-
-__all__ = ["quiet_domain"]
-
-
-@contextlib.contextmanager
-def quiet_domain() -> Iterator[int]:
-    """Provide a domain of this machine that nobody else uses."""
-    with free_domain() as domain:
-        os.environ |= {
-            "ROS_DOMAIN_ID": str(domain),
-            "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
-            "RCUTILS_COLORIZED_OUTPUT": "0",
-        }
-        yield domain
+"""What the harnesses share: processes, a participant, a run in a domain of its own, rows."""
