@@ -25,15 +25,17 @@ class Participant(contextlib.AbstractContextManager["Participant"]):
     ----------
     name : str
         Name of the node.
+    domain : int or None
+        Its domain; None: that of the environment.
     options
         Further ones of a node.
     """
 
-    def __init__(self, name: str, **options: Any) -> None:
-        self._context = rclpy.Context()
-        rclpy.init(args=[], context=self._context)
-        self.node = rclpy.create_node(name, context=self._context, enable_rosout=False, **options)
-        self._executor = SingleThreadedExecutor(context=self._context)
+    def __init__(self, name: str, domain: int | None = None, **options: Any) -> None:
+        self.context = rclpy.Context()
+        rclpy.init(args=[], context=self.context, domain_id=domain)
+        self.node = rclpy.create_node(name, context=self.context, enable_rosout=False, **options)
+        self._executor = SingleThreadedExecutor(context=self.context)
         self._executor.add_node(self.node)
 
     def __exit__(self, *_: object) -> None:
@@ -43,7 +45,7 @@ class Participant(contextlib.AbstractContextManager["Participant"]):
         """Leave politely."""
         self._executor.shutdown()
         self.node.destroy_node()
-        self._context.try_shutdown()
+        self.context.try_shutdown()
 
     def spin(self, seconds: float) -> None:
         """Listen for a while."""

@@ -7,13 +7,18 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Limits that all methods share."""
+"""Waiting for what another process or thread does."""
 
-import math
+import time
 
-from valve_friction_ros.identification.trust.verdict import FALL_SPEED
+PATIENCE = 60.0
+"""Time for one thing to happen on a loaded machine, s."""
 
 
-def test_friction_may_fall_up_to_twice_the_stribeck_velocity_of_graphite():
-    """v_s = 3.26 mm/s; exp(−(v/v_s)²) has fallen to e⁻⁴ at twice that."""
-    assert math.isclose(FALL_SPEED, 2 * 3.26e-3, rel_tol=0.01)
+def wait_until(condition, told=lambda: "", patience=PATIENCE, turn=0.01):
+    """Look until `condition()` is true, and return it; fail with what is `told` at the end."""
+    deadline = time.monotonic() + patience
+    while not (met := condition()):
+        assert time.monotonic() < deadline, f"not within {patience:g} s: {told()}"
+        time.sleep(turn)
+    return met
