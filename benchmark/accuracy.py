@@ -35,13 +35,10 @@ from benchmark.bounds import (
 from benchmark.cases import CONDITIONS, EXCITATIONS, NOISES, Case
 from benchmark.emps import emps_bounds
 from benchmark.information import Information, information
-from benchmark.picture import draw
 from benchmark.plants import PLANTS
-from benchmark.report import bounds_table, cases_table, information_table
+from benchmark.report import bounds_table, cases_table, draw, information_table
 from benchmark.runs import Outcome, run
 from valve_friction_ros.identification import DEFAULT_METHOD
-
-__all__ = ["Results", "main"]
 
 PARTS = ("cases", "coverage", "default", "alarms", "emps", "information", "timing")
 

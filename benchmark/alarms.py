@@ -27,8 +27,6 @@ from valve_friction_ros.model import (
     simulate,
 )
 
-__all__ = ["GROWTH", "AlarmCounts", "Diagnosed", "diagnosed"]
-
 GROWTH = 1.5
 """Friction of the valve whose packing was tightened, over that of the unchanged one."""
 

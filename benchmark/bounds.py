@@ -19,19 +19,6 @@ from benchmark.cases import Case
 from benchmark.runs import Outcome, wrong_claims
 from valve_friction_ros.identification import Verdict
 
-__all__ = [
-    "COVERAGE",
-    "FORCE_BOUND",
-    "Bound",
-    "alarm_bounds",
-    "by_case",
-    "case_bounds",
-    "coverage_bounds",
-    "coverage_of",
-    "default_bounds",
-    "worst",
-]
-
 COVERAGE = (0.90, 0.99)
 """Shares of the records between which a 95 % interval covers the truth."""
 

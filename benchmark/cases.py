@@ -26,8 +26,6 @@ from valve_friction_ros.model import (
 )
 from valve_friction_ros.model.excitations import pressure_at
 
-__all__ = ["CONDITIONS", "EXCITATIONS", "NOISES", "PERIOD", "Case", "Condition", "clean_record"]
-
 PERIOD = 1e-3
 """Sample period of the simulation and of the fast sensors, s."""
 

@@ -17,8 +17,6 @@ from benchmark.bounds import Bound
 from valve_friction_ros.identification import IdentificationSettings, Verdict, identify
 from valve_friction_ros.model import Drive, Recording, Valve
 
-__all__ = ["PUBLISHED", "RECORD", "emps_bounds"]
-
 RECORD = (
     Path(__file__).resolve().parents[2] / "shared" / "data" / "emps" / "emps_identification.csv"
 )

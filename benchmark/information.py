@@ -18,8 +18,6 @@ from benchmark.cases import NOISES, PERIOD, clean_record
 from benchmark.plants import PLANTS, Plant
 from valve_friction_ros.model import StemState, simulate
 
-__all__ = ["Information", "information"]
-
 _FREE = ("coulomb_friction", "viscous_friction", "spring_constant", "spring_preload")
 _SLIP, _START = "static_friction", "start"
 _STEP = 1e-4

@@ -32,8 +32,6 @@ from valve_friction_ros.identification import IdentificationSettings, RefusalErr
 from valve_friction_ros.model import Excitation, SquareWave, Valve
 from valve_friction_ros.planning import Conditions, Limits, StrokePlan, known_friction, plan_test
 
-__all__ = ["NUMBERS", "Trial", "main", "trials"]
-
 NUMBERS = ("coulomb_friction", "viscous_friction", "static_friction", "sliding_friction")
 _HELD_BACK = 90_000
 _RATE = 100.0

@@ -27,8 +27,6 @@ from valve_friction_ros.model import (
 )
 from valve_friction_ros.model.compiled import compiled
 
-__all__ = ["PLANTS", "Plant"]
-
 Motion = Callable[["Plant", NDArray[np.float64], float], NDArray[np.float64]]
 
 BRISTLE_STIFFNESS = 942.4 / 20e-6

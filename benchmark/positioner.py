@@ -24,8 +24,6 @@ from benchmark.reality.plants import Body, Friction, Plant
 from benchmark.reality.plants.constants import Constants, constants
 from benchmark.reality.plants.laws import INNER, V, X, moreau
 
-__all__ = ["FAULTS", "Case", "Record", "case_of", "simulated"]
-
 STEP = 1e-4
 FAULTS = ("healthy", "sticky", "late", "slow", "setting")
 

@@ -27,8 +27,6 @@ from valve_friction_ros.identification import (
     identify,
 )
 
-__all__ = ["SETTINGS", "TRUE_NAMES", "Outcome", "force_error", "run", "run_speeds", "wrong_claims"]
-
 SETTINGS = IdentificationSettings(assumed_mass=1.6)
 """Those of the bench valves' configuration."""
 

@@ -17,8 +17,10 @@ import socket
 import threading
 import time
 from datetime import datetime, timedelta, timezone
+from functools import partial
 
 import pytest
+import waiting
 from webhook_server import (
     Receiver,
     answer_for_ever,
@@ -183,11 +185,7 @@ def alert(message="", new=Level.WARN):
     return Alert("FV-101", "/fv_101/identifier", Level.OK, new, "M", message)
 
 
-def wait_until(condition):
-    deadline = time.monotonic() + PATIENCE
-    while not condition():
-        assert time.monotonic() < deadline
-        time.sleep(0.005)
+wait_until = partial(waiting.wait_until, patience=PATIENCE)
 
 
 def failure(url, limit=LIMIT):

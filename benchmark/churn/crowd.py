@@ -17,13 +17,10 @@ import traceback
 from collections.abc import Callable
 from pathlib import Path
 
-from benchmark.churn.audit import audit
-from benchmark.churn.ledger import Ledger
 from benchmark.churn.places import nodes
-from benchmark.churn.processes import CODES, NodeProcess
-from benchmark.churn.visitor import visit
-
-__all__ = ["Crowd"]
+from benchmark.churn.visitor import audit, visit
+from benchmark.harness.processes import CODES, Process
+from benchmark.harness.run import Ledger
 
 _PAUSE = 1.2
 """Mean time between two visitors that come, s."""
@@ -61,23 +58,14 @@ def _endings(ledger: Ledger, folder: Path, seed: int, seconds: float) -> None:
         number += 1
         name = chance.choice(sorted(kinds))
         log = folder / f"ending_{number}_{name}.log"
-        process = NodeProcess(kinds[name], log)
+        process = Process(kinds[name], log)
         within = _FIRST_SECONDS if chance.random() < 0.6 else _LONGEST_RUN
-        alive = chance.uniform(0.0, within)
-        time.sleep(alive)
+        time.sleep(alive := chance.uniform(0.0, within))
         request = chance.choice((signal.SIGINT, signal.SIGTERM))
-        seconds_to_end = process.end(request)
-        code = process.exit_code()
-        words = log.read_text(encoding="utf-8", errors="replace")
-        ledger.add(
-            "ending",
-            node=name,
-            request=request.name,
-            alive=alive,
-            seconds=seconds_to_end,
-            code=code,
-            words="" if code in CODES else words[-2000:],
-        )
+        took, code = process.end(request), process.exit_code()
+        known = {"node": name, "request": request.name, "alive": alive, "seconds": took}
+        words = "" if code in CODES else process.said()[-2000:]
+        ledger.add("ending", **known, code=code, words=words)
         if code in CODES:
             log.unlink()
         time.sleep(chance.uniform(0.0, _ENDING_PAUSE))
@@ -87,15 +75,6 @@ class Crowd:
     """Who comes and goes.
 
     The process that holds it must not start ROS itself: it is forked again and again.
-
-    Parameters
-    ----------
-    ledger : Ledger
-        What happens is noted there.
-    seed : int
-        Seed of all chance.
-    at_once : int
-        Visitors at a time.
     """
 
     def __init__(self, ledger: Ledger, seed: int, at_once: int) -> None:
@@ -121,17 +100,19 @@ class Crowd:
         for child, (until, is_killed) in list(self._visitors.items()):
             ended, status = os.waitpid(child, os.WNOHANG)
             if not ended and now > until:
-                os.kill(child, signal.SIGKILL)
-                os.waitpid(child, 0)
-                ended, status = child, 0
-                self._ledger.add("visit", end="killed" if is_killed else "hung")
+                self._kill(child, "killed" if is_killed else "hung")
             elif ended:
                 self._ledger.add("visit", end="gone" if status == 0 else f"status {status}")
-            if ended:
+            if ended or now > until:
                 del self._visitors[child]
         if len(self._visitors) < self._at_once and now > self._next:
             self._next = now + self._chance.expovariate(1 / _PAUSE)
             self._let_one_come(now)
+
+    def _kill(self, child: int, end: str) -> None:
+        os.kill(child, signal.SIGKILL)
+        os.waitpid(child, 0)
+        self._ledger.add("visit", end=end)
 
     def _let_one_come(self, now: float) -> None:
         self._count += 1
@@ -151,8 +132,6 @@ class Crowd:
         for child in children:
             while os.waitpid(child, os.WNOHANG)[0] == 0:
                 if time.monotonic() > until:
-                    os.kill(child, signal.SIGKILL)
-                    os.waitpid(child, 0)
-                    self._ledger.add("visit", end="hung")
+                    self._kill(child, "hung")
                     break
                 time.sleep(0.1)

@@ -11,25 +11,13 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
 
-__all__ = [
-    "AUDITED",
-    "IDENTIFIERS",
-    "NODES",
-    "RATE",
-    "SERVICES",
-    "STREAMS",
-    "Node",
-    "nodes",
-    "parameter_words",
-    "process_of",
-]
+from benchmark.harness.processes import node, parameters
 
 RATE = 250
 """Samples a second of each signal, Hz: visitors that listen cost more than the nodes."""
 
-_BENCH = Path(__file__).resolve().parents[2] / "config" / "bench_low.yaml"
+BENCH = Path(__file__).resolve().parents[2] / "config" / "bench_low.yaml"
 _VALVE = "/fv_101"
 AUDITED = f"{_VALVE}/identifier"
 """The identifier whose buffer nobody clears, so that each of its samples can be asked for."""
@@ -44,55 +32,36 @@ SERVICES = {"identify": 6, "set_baseline": 6, "clear": 5, "save": 2, "report": 1
 """Services of an identifier, and how often each is called beside the others."""
 
 
-class Node(NamedTuple):
-    """A process to start: an executable of the package and its ROS arguments."""
-
-    executable: str
-    arguments: Sequence[str]
-
-
-def parameter_words(**values: object) -> list[str]:
-    """Return the arguments that set parameters of a node."""
-    return [word for name, value in values.items() for word in ("-p", f"{name}:={value}")]
-
-
-def nodes(folder: Path, valve: str = _VALVE, others: Sequence[str] = _OTHERS) -> dict[str, Node]:
-    """Return the processes of a plant that writes into a folder.
+def nodes(
+    folder: Path, valve: str = _VALVE, others: Sequence[str] = _OTHERS
+) -> dict[str, list[str]]:
+    """Return the commands of the nodes of a plant that writes into a folder.
 
     The valve streams as its bench does; the others, in one process, hear the same streams.
     """
-    files = parameter_words(
+    files = parameters(
         history_file=folder / "history.sqlite",
         save_folder=folder / "saved",
         report_folder=folder / "reports",
     )
-    place = ["-r", f"__ns:={valve}", "--params-file", str(_BENCH)]
-    streams = (f"{valve}/actuator_pressure", f"{valve}/stem_state")
+    bench = ["--params-file", str(BENCH)]
+    place = ["-r", f"__ns:={valve}", *bench]
     heard = [
         word
         for other in others
-        for stream in streams
-        for word in ("-r", f"{other}/{stream.rpartition('/')[2]}:={stream}")
+        for stream in ("actuator_pressure", "stem_state")
+        for word in ("-r", f"{other}/{stream}:={valve}/{stream}")
     ]
-    found = {
-        "identifier": [*place, *files],
-        "identifiers": [
-            *heard,
-            "--params-file",
-            str(_BENCH),
-            *parameter_words(valves=f"[{','.join(others)}]"),
-            *files,
-        ],
-        "simulator": [*place, *parameter_words(position_noise=5e-6)],
-        "pressure_source": [
-            *place,
-            *parameter_words(sample_rate=float(RATE)),
-        ],
+    many = [*heard, *bench, *parameters(valves=f"[{','.join(others)}]")]
+    return {
+        "identifier": node("identifier", *place, *files),
+        "identifiers": node("identifiers", *many, *files),
+        "simulator": node("simulator", *place, *parameters(position_noise=5e-6)),
+        "pressure_source": node("pressure_source", *place, *parameters(sample_rate=float(RATE))),
     }
-    return {name: Node(name, arguments) for name, arguments in found.items()}
 
 
 def process_of(service: str) -> str:
     """Return the process of `nodes` that answers a service."""
-    valve, node, _ = service.strip("/").split("/")
-    return "identifiers" if f"/{valve}" in _OTHERS else node
+    valve, name, _ = service.strip("/").split("/")
+    return "identifiers" if f"/{valve}" in _OTHERS else name

@@ -7,28 +7,29 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""A participant that comes, asks and listens for some seconds, and goes: politely or not."""
+"""Participants that come, ask, listen and go, politely or not; one of them, an auditor, stays."""
 
 import os
 import random
+import shutil
 import time
+from pathlib import Path
 from typing import Any
 
-import rclpy
+import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters, SetParameters
-from rclpy.client import Client
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rosbags.rosbag2 import Reader
+from rosbags.typesys import Stores, get_typestore
 from sensor_msgs.msg import FluidPressure, JointState
 from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 
-from benchmark.churn.ledger import Ledger
-from benchmark.churn.places import AUDITED, IDENTIFIERS, NODES, SERVICES, STREAMS
-
-__all__ = ["ANSWER_LIMIT", "Visitor", "visit"]
+from benchmark.churn.places import AUDITED, IDENTIFIERS, NODES, RATE, SERVICES, STREAMS
+from benchmark.harness.participant import Participant
+from benchmark.harness.run import Ledger
 
 ANSWER_LIMIT = 5.0
 """Time, s, within which a call is to be answered."""
@@ -37,49 +38,28 @@ _HANG = 30.0
 _DISCOVERY = 30.0
 _LONGEST_LISTENING = 2.0
 _MOST_ACTS = 6
+_RELIABLE = (ReliabilityPolicy.RELIABLE, ReliabilityPolicy.BEST_EFFORT)
+_LOOK = 25.0
+"""Time between two looks of the auditor into the buffer, s: less than half of what it holds."""
 
 
-class Visitor:
-    """A node in a context of its own.
-
-    Parameters
-    ----------
-    ledger : Ledger
-        Where each call is noted.
-    name : str
-        Name of the node.
-    """
+class Visitor(Participant):
+    """A participant that notes each of its calls."""
 
     def __init__(self, ledger: Ledger, name: str) -> None:
         self._ledger = ledger
-        self._context = rclpy.Context()
-        rclpy.init(args=[], context=self._context)
-        self.node = rclpy.create_node(name, context=self._context, enable_rosout=False)
-        self._executor = SingleThreadedExecutor(context=self._context)
-        self._executor.add_node(self.node)
-
-    def close(self) -> None:
-        """Leave politely."""
-        self._executor.shutdown()
-        self.node.destroy_node()
-        self._context.try_shutdown()
-
-    def spin(self, seconds: float) -> None:
-        """Listen for a while."""
-        end = time.monotonic() + seconds
-        while (left := end - time.monotonic()) > 0:
-            self._executor.spin_once(timeout_sec=left)
+        super().__init__(name)
 
     def call(self, kind: type, name: str, request: Any) -> Any:
         """Call a service, and note how it answered; return the answer, None without one."""
-        client: Client = self.node.create_client(kind, name)
+        client = self.node.create_client(kind, name)
         try:
             begin = time.monotonic()
             if not client.wait_for_service(_DISCOVERY):
                 self._ledger.add("undiscovered", service=name)
                 return None
             found = time.monotonic()
-            answer = self._answer(client, request)
+            answer = self.answer(client.call_async(request), _HANG)
             self._ledger.add(
                 "call",
                 service=name,
@@ -89,16 +69,11 @@ class Visitor:
                 message=getattr(answer, "message", ""),
             )
             since = time.time()
-            if answer is None and self._answer(client, request) is None:
+            if answer is None and self.answer(client.call_async(request), _HANG) is None:
                 self._ledger.add("unanswered twice", service=name, since=since)
             return answer
         finally:
             self.node.destroy_client(client)
-
-    def _answer(self, client: Client, request: Any) -> Any:
-        future = client.call_async(request)
-        self._executor.spin_until_future_complete(future, _HANG)
-        return future.result() if future.done() else None
 
 
 def _trigger(visitor: Visitor, chance: random.Random) -> None:
@@ -143,9 +118,6 @@ def _listen(visitor: Visitor, chance: random.Random) -> None:
         visitor.node.destroy_subscription(subscription)
 
 
-_RELIABLE = (ReliabilityPolicy.RELIABLE, ReliabilityPolicy.BEST_EFFORT)
-
-
 def _look_around(visitor: Visitor, chance: random.Random) -> None:
     visitor.spin(chance.uniform(0.0, 0.5))
     for name, _ in visitor.node.get_topic_names_and_types():
@@ -178,3 +150,56 @@ def visit(ledger: Ledger, number: int, chance: random.Random) -> None:
     if chance.random() < 0.25:
         os._exit(0)
     visitor.close()
+
+
+def _stamps(bag: Path) -> dict[str, np.ndarray]:
+    types = get_typestore(Stores.ROS2_JAZZY)
+    found: dict[str, list[int]] = {topic: [] for topic in STREAMS}
+    with Reader(bag) as reader:
+        for connection, _, raw in reader.messages():
+            stamp = types.deserialize_cdr(raw, connection.msgtype).header.stamp
+            found[connection.topic].append(stamp.sec * 1_000_000_000 + stamp.nanosec)
+    return {topic: np.array(stamps) for topic, stamps in found.items()}
+
+
+def missing_samples(stamps: np.ndarray) -> int:
+    """Return how many samples lack between the first and the last stamp (ns) of a signal."""
+    return 0 if stamps.size == 0 else round(np.ptp(stamps) * RATE / 1e9) + 1 - stamps.size
+
+
+def audit(ledger: Ledger, seconds: float) -> None:
+    """Save the buffer of the audited identifier again and again, and count what it lacks.
+
+    Note too for how long `/diagnostics` fell silent.
+    """
+    published: list[float] = []
+
+    def note(message: DiagnosticArray) -> None:
+        if any(status.name.startswith(AUDITED) for status in message.status):
+            stamp = message.header.stamp
+            published.append(stamp.sec + stamp.nanosec / 1e9)
+
+    until = time.monotonic() + seconds
+    with Visitor(ledger, "auditor") as visitor:
+        visitor.node.create_subscription(DiagnosticArray, "/diagnostics", note, 1000)
+        while time.monotonic() < until:
+            visitor.spin(_LOOK)
+            published.append(time.time())  # a silence that lasts counts too
+            answer = visitor.call(Trigger, f"{AUDITED}/save", Trigger.Request())
+            if answer is None or not answer.success:
+                ledger.add("unsaved", message=getattr(answer, "message", "no answer"))
+                continue
+            bag = Path(answer.message)
+            for topic, stamps in _stamps(bag).items():
+                ledger.add(
+                    "samples",
+                    topic=topic,
+                    first=int(stamps.min(initial=2**62)),
+                    last=int(stamps.max(initial=0)),
+                    count=stamps.size,
+                    missing=missing_samples(stamps),
+                )
+            shutil.rmtree(bag)
+            if len(published) > 1:
+                ledger.add("diagnostics", longest=float(np.diff(published).max()))
+                del published[:-1]

@@ -32,7 +32,6 @@ class Outcome(NamedTuple):
     kind: str
     options: int
     message: str
-    recording: Recording | None = None
 
 
 def read(export: Export, truth: Truth, folder: Path) -> Outcome:
@@ -59,36 +58,27 @@ def read(export: Export, truth: Truth, folder: Path) -> Outcome:
                 return Outcome("refused", len(given), message)
             given = told
             continue
-        fault = _fault(export, truth, recording)
-        if fault:
-            return Outcome("wrong", len(given), fault, recording)
-        return Outcome("options" if given else "none", len(given), message, recording)
+        if fault := _fault(export, truth, recording):
+            return Outcome("wrong", len(given), fault)
+        return Outcome("options" if given else "none", len(given), message)
     return Outcome("refused", len(given), message)
 
 
 def _fault(export: Export, truth: Truth, recording: Recording) -> str:
     """Return how a recording differs from the truth; nothing if it does not."""
     if recording.stamped is None:
-        start = recording.start_time
-        signals = ((recording.time, recording.drive), (recording.time, recording.position))
+        drive = (recording.time, recording.drive)
+        stem = (recording.time, recording.position)
     else:
-        start = recording.start_time
         stamped = recording.stamped
-        signals = (
-            (stamped.drive.time, stamped.drive.value),
-            (stamped.position.time, stamped.position.value),
-        )
-    begin = truth.start / 1e9
-    if export.exact_date and abs(start - begin) > 0.5:
-        return f"begins {start - begin:g} s late"
-    offset = start - begin if export.exact_date else 0.0
-    truths = (truth.pressure, truth.position)
-    for (time, values), true, coarse, name in zip(
-        signals,
-        truths,
-        (export.coarse_pressure, export.coarse_position),
-        ("pressure", "position"),
-        strict=True,
+        drive = (stamped.drive.time, stamped.drive.value)
+        stem = (stamped.position.time, stamped.position.value)
+    offset = recording.start_time - truth.start / 1e9 if export.exact_date else 0.0
+    if abs(offset) > 0.5:
+        return f"begins {offset:g} s late"
+    for name, (time, values), true, coarse in (
+        ("pressure", drive, truth.pressure, export.coarse_pressure),
+        ("position", stem, truth.position, export.coarse_position),
     ):
         at = np.interp(time + offset, truth.time, true)
         steep = np.max(np.abs(np.diff(true)) / np.diff(truth.time)) * export.clock

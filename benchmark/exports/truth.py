@@ -82,15 +82,7 @@ def draw(count: int, seed: int) -> list[Truth]:
         day = int(random.integers(0, 300))
         start = 1_767_225_600_000_000_000 + day * 86_400_000_000_000
         start += int(random.integers(6 * 3600, 20 * 3600)) * 1_000_000_000
-        found.append(
-            Truth(
-                float(area[one]),
-                float(travel[one]),
-                float(friction[one]),
-                time[::every],
-                pressure[::every, one],
-                position[::every, one],
-                start,
-            )
-        )
+        signals = (time[::every], pressure[::every, one], position[::every, one])
+        sizes = (float(values[one]) for values in (area, travel, friction))
+        found.append(Truth(*sizes, *signals, start))
     return found

@@ -14,23 +14,26 @@ import contextlib
 import json
 import math
 import os
-import subprocess
 import sys
+import tempfile
+import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from rich.console import Console
-
-from benchmark.hosts.database import Database, plant_database
-from benchmark.hosts.network import Host, Traffic, network
-from benchmark.hosts.picture import Picture
-from benchmark.process_usage import processor_seconds, resident_megabytes
-from benchmark.speed.rows import Row
-from benchmark.speed.table import machine_shape, rows_table, write_json
-
-__all__ = ["main"]
+from benchmark.harness.postgres import PostgresServer, running_server
+from benchmark.harness.processes import Process, processor_seconds, resident_megabytes
+from benchmark.harness.rows import (
+    Row,
+    judged,
+    logged,
+    opened_console,
+    rows_table,
+    some,
+    write_json,
+)
+from benchmark.hosts.network import OUTSIDE, Host, Traffic, network
 
 _SERVER_PORT = 11811
 _START = 600.0
@@ -39,98 +42,175 @@ _PATIENCE = 120.0
 _TRUTH = 6.0
 """Time, s, within which the dashboard shall show what has happened: its silence of 5 s, and the
 second between two messages of a valve."""
-_BLOCKS_A_SECOND = 10
 _ASKED = 5
 """Valves of a host that are identified while it is cut off, and before it dies."""
+_LOOK, _LOOK_AT_DATABASE = 0.1, 0.2
+_COUNT = """
+SELECT count(*) FROM identification JOIN valve ON valve.id = valve_id WHERE valve.name LIKE %s
+"""
+
+
+class Group(NamedTuple):
+    """The valves of one host: those shown as heard and as silent, and the fewest samples held."""
+
+    heard: int = 0
+    silent: int = 0
+    fewest: int = 0
+
+
+class Picture:
+    """What the dashboard shows: the newest line that it has printed, read in a thread."""
+
+    def __init__(self, process: Process) -> None:
+        self._process = process
+        self._groups: dict[str, Group] = {}
+        threading.Thread(target=self._read, daemon=True).start()
+
+    def _read(self) -> None:
+        for line in self._process.output:
+            found = json.loads(line)["groups"]
+            self._groups = {name: Group(**group) for name, group in found.items()}
+
+    def group(self, name: str) -> Group:
+        """Return what is shown of the valves of a host."""
+        return self._groups.get(name, Group())
+
+    def time_until(
+        self, is_met: Callable[[], bool], patience: float, begin: float | None = None
+    ) -> float:
+        """Wait until the picture is so; return the time since `begin` or now, s; inf if never."""
+        begin = time.monotonic() if begin is None else begin
+        while not is_met():
+            if time.monotonic() - begin > patience:
+                return math.inf
+            self._process.require_running()
+            time.sleep(_LOOK)
+        return time.monotonic() - begin
+
+
+class Database:
+    """A server, outside of the hosts, that all send their history to from files of their own."""
+
+    def __init__(self, server: PostgresServer, folder: Path) -> None:
+        self._server, self._folder = server, folder
+        self._name = server.database()
+
+    def arguments(self, host: str) -> list[str]:
+        """Return the arguments of a host's processes."""
+        file, url = self._folder / f"{host}.sqlite", self._server.url(self._name)
+        return ["--history", str(file), "--history-url", url]
+
+    def count(self, host: str) -> int:
+        """Return the identifications of a host's valves that are on the server."""
+        if not self._server.do(self._name, "SELECT to_regclass('identification')")[0][0]:
+            return 0  # nobody has sent anything
+        ((count,),) = self._server.do(self._name, _COUNT, (f"/{host}\\_%",))
+        return int(count)
+
+    def rows(
+        self, host: str, words: str, answered: int, patience: float, begin: float
+    ) -> Iterator[Row]:
+        """Wait until all that a host has answered is on the server."""
+        while self.count(host) < answered and time.monotonic() < begin + patience:
+            time.sleep(_LOOK_AT_DATABASE)
+        kept = self.count(host)
+        took = time.monotonic() - begin if kept >= answered else math.inf
+        yield some(f"host {words}: identifications answered", answered)
+        yield Row("of them on the server", kept, goal="all", met=kept == answered)
+        yield Row("after", took, "s")
+
+
+@contextlib.contextmanager
+def _database() -> Iterator[Database | None]:
+    """Provide a new database on a new server; None where no server can be started."""
+    with running_server(OUTSIDE) as server, tempfile.TemporaryDirectory() as folder:
+        yield None if server is None else Database(server, Path(folder))
 
 
 class _Running:
     """What runs on one host with valves."""
 
     def __init__(
-        self,
-        host: Host,
-        name: str,
-        options: argparse.Namespace,
-        seconds: float,
-        database: Database | None,
+        self, host: Host, name: str, options: argparse.Namespace, kept: Sequence[str]
     ) -> None:
         self.host, self.name, self.valves = host, name, options.valves
         valves = [f"{name}_{number}" for number in range(options.valves)]
-        stream = ["--rate", str(options.rate), "--seconds", str(round(seconds))]
-        kept = [] if database is None else database.arguments(name)
-        self.process = host.start("benchmark.hosts.host", [*valves, *stream, *kept])
-        self.pids: dict[str, int] = json.loads(self.line())
+        seconds = round(options.seconds + options.cut + 60.0)
+        stream = ["--rate", str(options.rate), "--seconds", str(seconds)]
+        self.process = host.start_module("benchmark.hosts.host", *valves, *stream, *kept)
+        self._identifiers = int(self.process.output.readline())
 
-    def line(self) -> str:
-        assert self.process.stdout is not None  # noqa: S101 - it was asked for
-        return self.process.stdout.readline() or "{}"
-
-    def is_shown(self, picture: Picture) -> bool:
-        group = picture.group(self.name)
-        return (group.heard, group.silent) == (self.valves, 0)
-
-    def is_silent(self, picture: Picture) -> bool:
-        return picture.group(self.name).silent == self.valves
+    def samples_sent(self) -> int:
+        """Wait until the source has sent all; return how many samples of both signals."""
+        return 2 * int(self.process.output.readline())
 
     def ask(self) -> int:
         """Have some of its valves identified, by somebody on the host; return the answers."""
-        asker = self.host.start(
-            "benchmark.hosts.asker", [f"{self.name}_{number}" for number in range(_ASKED)]
-        )
-        told, _ = asker.communicate()
-        return int(told or 0)
+        valves = [f"{self.name}_{number}" for number in range(_ASKED)]
+        with self.host.start_module("benchmark.hosts.host", *valves, "--ask") as asker:
+            return int(asker.output.read() or 0)
 
-    def cpu(self) -> float:
-        return processor_seconds(self.pids["identifiers"])
+    def processor(self) -> float:
+        """Return the processor time of its identifiers, s."""
+        return processor_seconds(self._identifiers)
 
     def megabytes(self) -> float:
-        return resident_megabytes(self.pids["identifiers"])
+        """Return the memory of its identifiers."""
+        return resident_megabytes(self._identifiers)
 
 
-class _Plant(NamedTuple):
-    """The dashboard and the hosts."""
+class _Plant:
+    """The dashboard and the hosts, with what they use and show."""
 
-    dashboard: "subprocess.Popen[str]"
-    picture: Picture
-    at: Host
-    hosts: list[_Running]
-    database: Database | None
+    def __init__(
+        self, hosts: Sequence[Host], options: argparse.Namespace, database: Database | None
+    ) -> None:
+        office, *others = hosts
+        self.office, self.database, self._options = office, database, options
+        self.begin = time.monotonic()
+        words = ("--ros-args", "-p", "history_file:=''")
+        self.dashboard = office.start_module("benchmark.hosts.dashboard", *words)
+        self.picture = Picture(self.dashboard)
+        self.hosts = [self.run(host, f"h{number}") for number, host in enumerate(others)]
+        self.valves = options.valves * len(others)
 
-    def is_complete(self, picture: Picture) -> bool:
-        return all(one.is_shown(picture) for one in self.hosts)
+    def run(self, host: Host, name: str) -> _Running:
+        """Start a host."""
+        kept = self.database.arguments(name) if self.database else []
+        return _Running(host, name, self._options, kept)
 
+    def is_shown(self, one: _Running) -> bool:
+        """Whether all valves of a host are shown, and none is silent."""
+        group = self.picture.group(one.name)
+        return (group.heard, group.silent) == (one.valves, 0)
 
-def _seconds(options: argparse.Namespace) -> float:
-    """Return for how long the sources stream."""
-    return options.seconds + options.cut + 60.0
+    def is_silent(self, one: _Running) -> bool:
+        """Whether all valves of a host are shown as silent."""
+        return self.picture.group(one.name).silent == one.valves
+
+    def is_complete(self) -> bool:
+        """Whether all hosts are shown."""
+        return all(map(self.is_shown, self.hosts))
+
+    def truth(self, item: str, is_met: Callable[[], bool]) -> Row:
+        """Wait until the picture is so, which it shall be soon."""
+        took = self.picture.time_until(is_met, _PATIENCE)
+        return Row(item, took, "s", goal=f"within {_TRUTH:g} s", met=took <= _TRUTH)
 
 
 @contextlib.contextmanager
-def _started(options: argparse.Namespace) -> Iterator[tuple[_Plant, float]]:
-    """Provide the running plant, and when it was started."""
-    with network(options.hosts + 1) as (office, *others), contextlib.ExitStack() as stack:
+def _started(options: argparse.Namespace) -> Iterator[_Plant]:
+    """Provide the running plant."""
+    with network(options.hosts + 1) as hosts, contextlib.ExitStack() as stack:
         os.environ |= {"ROS_DOMAIN_ID": "0", "RCUTILS_COLORIZED_OUTPUT": "0"}
         for name in ("ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_DISCOVERY_SERVER"):
             os.environ.pop(name, None)
         if options.server:
-            executable = Path(sys.executable).with_name("fast-discovery-server")
-            command = ["ip", "netns", "exec", office.name, str(executable), "-i", "0"]
-            command += ["-l", office.address, "-p", str(_SERVER_PORT)]
-            server = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
-            stack.callback(server.wait)
-            stack.callback(server.kill)
-            os.environ["ROS_DISCOVERY_SERVER"] = f"{office.address}:{_SERVER_PORT}"
-        database = stack.enter_context(plant_database())
-        begin = time.monotonic()
-        dashboard = office.start(
-            "benchmark.hosts.dashboard", ["--ros-args", "-p", "history_file:=''"]
-        )
-        hosts = [
-            _Running(host, f"h{number}", options, _seconds(options), database)
-            for number, host in enumerate(others)
-        ]
-        yield _Plant(dashboard, Picture(dashboard), office, hosts, database), begin
+            executable = str(Path(sys.executable).with_name("fast-discovery-server"))
+            where = ("-l", hosts[0].address, "-p", str(_SERVER_PORT))
+            stack.callback(hosts[0].start([executable, "-i", "0", *where]).kill)
+            os.environ["ROS_DISCOVERY_SERVER"] = f"{hosts[0].address}:{_SERVER_PORT}"
+        yield _Plant(hosts, options, stack.enter_context(_database()))
 
 
 class _Use(NamedTuple):
@@ -147,28 +227,21 @@ def _used(plant: _Plant) -> _Use:
     traffic = [one.host.traffic() for one in plant.hosts]
     return _Use(
         time.monotonic(),
-        sum(one.cpu() for one in plant.hosts),
-        processor_seconds(plant.dashboard.pid),
+        sum(one.processor() for one in plant.hosts),
+        plant.dashboard.usage().processor,
         Traffic(*map(sum, zip(*traffic, strict=True))),
-        plant.at.traffic(),
+        plant.office.traffic(),
     )
 
 
-def _truth(item: str, seconds: float) -> Row:
-    return Row(item, seconds, "s", goal=f"within {_TRUTH:g} s", met=seconds <= _TRUTH)
-
-
-def _at_start(plant: _Plant, begin: float) -> Iterator[Row]:
-    took = plant.picture.time_until(plant.is_complete, _START, begin)
-    count = sum(one.valves for one in plant.hosts)
+def _at_start(plant: _Plant) -> Iterator[Row]:
+    took = plant.picture.time_until(plant.is_complete, _START, plant.begin)
     yield Row("start to the complete picture", took, "s", goal="shown", met=math.isfinite(took))
-    traffic = [one.host.traffic() for one in plant.hosts]
-    sent = sum(one.sent for one in traffic)
-    yield Row("traffic until then, a valve", sent / count / 1e3, "kB")
-    spent = sum(one.cpu() for one in plant.hosts)
-    yield Row("processor time of the identifiers until then, a valve", 1e3 * spent / count, "ms")
-    busy = processor_seconds(plant.dashboard.pid)
-    yield Row("processor time of the dashboard until then", busy, "s")
+    used, count = _used(plant), plant.valves
+    yield Row("traffic until then, a valve", used.traffic.sent / count / 1e3, "kB")
+    spent = 1e3 * used.identifiers / count
+    yield Row("processor time of the identifiers until then, a valve", spent, "ms")
+    yield Row("processor time of the dashboard until then", used.dashboard, "s")
 
 
 def _in_service(plant: _Plant, seconds: float) -> Iterator[Row]:
@@ -177,78 +250,75 @@ def _in_service(plant: _Plant, seconds: float) -> Iterator[Row]:
     before = _used(plant)
     time.sleep(seconds / 2)
     after = _used(plant)
-    count, span = sum(one.valves for one in plant.hosts), after.time - before.time
+    count, span = plant.valves, after.time - before.time
     sent = after.traffic.since(before.traffic)
     yield Row("a valve", 1e3 * (after.identifiers - before.identifiers) / span / count, "mcores")
     yield Row("a valve", sum(one.megabytes() for one in plant.hosts) / count, "MB")
     yield Row("a valve", sent.sent / span / count / 1e3, "kB/s")
     yield Row("a valve", sent.packets_sent / span / count, "packets/s")
     yield Row("dashboard", (after.dashboard - before.dashboard) / span, "cores")
-    yield Row("dashboard", resident_megabytes(plant.dashboard.pid), "MB")
+    yield Row("dashboard", plant.dashboard.usage().memory, "MB")
     heard = after.office.since(before.office).received
     yield Row("received by the dashboard's host", heard / span / 1e6, "MB/s")
 
 
-def _death(plant: _Plant, options: argparse.Namespace) -> Iterator[Row]:
+def _death(plant: _Plant) -> Iterator[Row]:
     """Kill a host, and start it again."""
     dead, others, database = plant.hosts[0], plant.hosts[1:], plant.database
     answered = dead.ask() if database else 0
     dead.host.kill()  # what it has kept may wait still
-    dead.process.wait()
-    yield _truth("a host dies: its valves are silent", _until(plant, dead.is_silent))
-    rest = all(one.is_shown(plant.picture) for one in others)
-    yield Row(
-        "hosts that are still shown then", float(rest * len(others)), "", None, "", "all", rest
-    )
-    plant.hosts[0] = _Running(dead.host, dead.name, options, _seconds(options), database)
+    dead.process.kill()
+    silent = plant.truth("a host dies: its valves are silent", lambda: plant.is_silent(dead))
+    rest = all(map(plant.is_shown, others))
+    yield silent
+    yield Row("hosts that are still shown then", float(rest * len(others)), goal="all", met=rest)
+    plant.hosts[0] = plant.run(dead.host, dead.name)
     if database:
-        yield from database.rows(dead.name, "that died, and is back", answered, _START)
-    took = plant.picture.time_until(plant.is_complete, _START)
-    yield Row(
-        "it returns: start to the complete picture", took, "s", None, "", "shown", took < _START
-    )
+        words = "that died, and is back"
+        yield from database.rows(dead.name, words, answered, _START, time.monotonic())
+    took, item = plant.picture.time_until(plant.is_complete, _START), "it returns: start to the"
+    yield Row(f"{item} complete picture", took, "s", goal="shown", met=took < _START)
 
 
 def _partition(plant: _Plant, seconds: float) -> Iterator[Row]:
     """Pull the plug of a host for a while."""
-    cut = plant.hosts[-1]
+    cut, database = plant.hosts[-1], plant.database
     begin = time.monotonic()
     cut.host.plug(False)
-    yield _truth("a host is cut off: its valves are silent", _until(plant, cut.is_silent))
+    yield plant.truth("a host is cut off: its valves are silent", lambda: plant.is_silent(cut))
     answered = 0
-    if plant.database:
+    if database:
         answered = cut.ask()
-        yield Row("of its identifications meanwhile, answered there", answered, "")
-        kept = plant.database.count(cut.name)
-        yield Row("of them on the server while it is cut off", kept, "", None, "", "0", not kept)
+        yield Row("of its identifications meanwhile, answered there", answered)
+        kept = database.count(cut.name)
+        item = "of them on the server while it is cut off"
+        yield Row(item, kept, goal="0", met=not kept)
     time.sleep(max(0.0, begin + seconds - time.monotonic()))
     cut.host.plug(True)
     plugged = time.monotonic()
-    yield _truth("plugged in again: its valves are heard", _until(plant, cut.is_shown))
-    if plant.database:
-        words = "that was cut off"
-        yield from plant.database.rows(cut.name, words, answered, _PATIENCE, plugged)
-    yield _truth("and the complete picture", _until(plant, plant.is_complete))
-
-
-def _until(plant: _Plant, condition: object) -> float:
-    return plant.picture.time_until(condition, _PATIENCE)  # type: ignore[arg-type]
+    yield plant.truth("plugged in again: its valves are heard", lambda: plant.is_shown(cut))
+    if database:
+        yield from database.rows(cut.name, "that was cut off", answered, _PATIENCE, plugged)
+    yield plant.truth("and the complete picture", plant.is_complete)
 
 
 def _at_end(plant: _Plant) -> Iterator[Row]:
     """Count the samples that the identifiers hold, once the sources have sent all."""
     for one in plant.hosts[1:]:
-        sent = 2 * int(one.line())
-        plant.picture.time_until(lambda p, o=one, s=sent: p.group(o.name).fewest >= s, 10.0)
-        held = plant.picture.group(one.name).fewest
-        item = f"samples held of those sent on {one.name}"
-        yield Row(item, 100 * held / sent, "%", None, "", "all", held == sent)
+        sent = one.samples_sent()
+
+        def held(one: _Running = one) -> int:
+            return plant.picture.group(one.name).fewest
+
+        plant.picture.time_until(lambda held=held, sent=sent: held() >= sent, 10.0)
+        item, share = f"samples held of those sent on {one.name}", 100 * held() / sent
+        yield Row(item, share, "%", goal="all", met=held() == sent)
 
 
-def _rows(plant: _Plant, begin: float, options: argparse.Namespace) -> Iterator[Row]:
-    yield from _at_start(plant, begin)
+def _rows(plant: _Plant, options: argparse.Namespace) -> Iterator[Row]:
+    yield from _at_start(plant)
     yield from _in_service(plant, options.seconds)
-    yield from _death(plant, options)
+    yield from _death(plant)
     yield from _partition(plant, options.cut)
     yield from _at_end(plant)
 
@@ -271,19 +341,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the plant; return 1 if a goal is missed."""
     options = _options(arguments)
     if os.geteuid():
-        print("hosts: network namespaces need root: run `sudo make hosts`", file=sys.stderr)  # noqa: T201
+        print("hosts: network namespaces need root: run `sudo make hosts`", file=sys.stderr)
         return 2
-    console, found = Console(width=None if sys.stdout.isatty() else 120), []
-    console.print(", ".join(f"{name} {value}" for name, value in machine_shape().items()))
+    console, found = opened_console(), []
     discovery = "discovery server" if options.server else "multicast"
     title = f"{options.hosts} hosts × {options.valves} valves, {discovery}"
-    with _started(options) as (plant, begin):
-        for row in _rows(plant, begin, options):
-            found.append(row)
-            console.log(f"{row.item}: {row.ours:.3g} {row.unit}")
+    with _started(options) as plant:
+        logged(_rows(plant, options), found, console)
     console.print(rows_table(title, found))
     write_json({title: found}, options.output)
-    return 1 if any(row.met is False for row in found) else 0
+    return judged(found, console)
 
 
 if __name__ == "__main__":

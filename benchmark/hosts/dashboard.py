@@ -24,8 +24,6 @@ from valve_friction_ros.nodes.dashboard.node import Dashboard
 from valve_friction_ros.nodes.plumbing.polled_node import TurnExecutor
 from valve_friction_ros.nodes.plumbing.running import StopRequest
 
-__all__ = ["main"]
-
 _TURN = 0.05
 _EVERY, _COUNTED_EVERY = 0.2, 3.0
 _Groups = dict[str, dict[str, int]]
@@ -69,7 +67,7 @@ def main() -> int:
                     fewest, counted = _fewest(node), due + _COUNTED_EVERY
                 shown = _picture(node)
                 groups = {name: {**shown[name], "fewest": fewest.get(name, 0)} for name in shown}
-                print(json.dumps({"time": time.time(), "groups": groups}), flush=True)  # noqa: T201
+                print(json.dumps({"time": time.time(), "groups": groups}), flush=True)
             time.sleep(_TURN)
         stop.is_followed = True
     executor.shutdown()

@@ -7,57 +7,66 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The processes of one host: `identifiers` and the source of its samples.
+"""The processes of one host: `identifiers` and the source of its samples; or one that asks them.
 
-It prints their numbers as JSON, then how many samples of a signal each valve was sent, and ends
-with its input.
+It prints the number of `identifiers`, then how many samples of a signal each valve was sent, and
+ends with its input. With `--ask` it asks the valves to identify, one after the other, and prints
+how many answered; refusals are answers.
 """
 
 import argparse
-import json
-import subprocess
+import os
 import sys
+from pathlib import Path
 
-__all__ = ["main"]
+from benchmark.harness.processes import Process, module, parameters
+from valve_friction_ros.nodes.service_call import caller
 
-_IDENTIFIERS = ("-m", "valve_friction_ros.nodes.identifiers", "--ros-args", "--log-level", "error")
+_PATIENCE = 300.0
+
+
+def _ask(options: argparse.Namespace) -> None:
+    # Who is started later has a shared memory of its own, and the host would be sought there.
+    os.environ["FASTDDS_BUILTIN_TRANSPORTS"] = "UDPv4"
+    answered = 0
+    with caller(lambda: True) as client:
+        for valve in options.valves:
+            identifier = client.find(valve, _PATIENCE)
+            answered += client.call(identifier, "identify", _PATIENCE) is not None
+    print(answered, flush=True)
+
+
+def _serve(options: argparse.Namespace) -> None:
+    """Start both processes, and end them with the input."""
+    given = parameters(
+        valves=f"[{','.join(options.valves)}]",
+        history_file=options.history,
+        history_url=options.history_url,
+        window=3600.0,
+    )
+    words = ("--ros-args", "--log-level", "error")
+    stream = ("--rate", str(options.rate), "--seconds", str(options.seconds), "--blocks")
+    command = module("valve_friction_ros.nodes.identifiers", *words, *given)
+    identifiers = Process(command, Path("/dev/stderr"))
+    source = Process(module("benchmark.speed.stream_source", *options.valves, *stream))
+    print(identifiers.pid, flush=True)
+    print(source.output.readline(), end="", flush=True)
+    sys.stdin.read()
+    identifiers.end()
+    source.end()
 
 
 def main() -> int:
-    """Start both, and end them with the input."""
+    """Serve, or ask."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("valves", nargs="+")
-    parser.add_argument("--rate", type=int, required=True)
-    parser.add_argument("--seconds", type=float, required=True)
+    parser.add_argument("--rate", type=int)
+    parser.add_argument("--seconds", type=float)
     parser.add_argument("--history", default="''")
     parser.add_argument("--history-url", default="''")
+    parser.add_argument("--ask", action="store_true")
     options = parser.parse_args()
-    parameters = [
-        f"valves:=[{','.join(options.valves)}]",
-        f"history_file:={options.history}",
-        f"history_url:={options.history_url}",
-        "window:=3600.0",
-    ]
-    given = [word for one in parameters for word in ("-p", one)]
-    identifiers = subprocess.Popen(
-        [sys.executable, *_IDENTIFIERS, *given],
-        stdin=subprocess.DEVNULL,
-        stdout=sys.stderr,
-    )
-    stream = ["--rate", str(options.rate), "--seconds", str(options.seconds), "--blocks"]
-    source = subprocess.Popen(
-        [sys.executable, "-m", "benchmark.speed.stream_source", *options.valves, *stream],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        text=True,
-    )
-    print(json.dumps({"identifiers": identifiers.pid, "source": source.pid}), flush=True)  # noqa: T201
-    print(source.stdout.readline() if source.stdout else "", end="", flush=True)  # noqa: T201
-    sys.stdin.read()
-    for process in (identifiers, source):
-        process.terminate()
-    for process in (identifiers, source):
-        process.wait(20)
+    (_ask if options.ask else _serve)(options)
     return 0
 
 

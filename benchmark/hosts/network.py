@@ -14,12 +14,11 @@ import os
 import shutil
 import signal
 import subprocess
-import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-__all__ = ["OUTSIDE", "Host", "Traffic", "network"]
+from benchmark.harness.processes import Process, module
 
 _BRIDGE = "vfbridge"
 _NETWORK = "10.77.0"
@@ -49,13 +48,7 @@ class Traffic(NamedTuple):
 
 
 class Host:
-    """A network namespace with a cable to the bridge.
-
-    Parameters
-    ----------
-    number : int
-        Number of the host, from 0.
-    """
+    """A network namespace with a cable to the bridge; hosts are numbered from 0."""
 
     def __init__(self, number: int) -> None:
         self.name = f"vfhost{number}"
@@ -79,15 +72,14 @@ class Host:
             self.kill()
             _ip("netns", "delete", self.name)
 
-    def start(self, module: str, arguments: Sequence[str] = ()) -> "subprocess.Popen[str]":
-        """Run a Python module on the host."""
-        shell = ["sh", "-c", _OWN_SHARED_MEMORY, "sh", sys.executable, "-m", module, *arguments]
-        return subprocess.Popen(
-            [_IP, "netns", "exec", self.name, *shell],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-        )
+    def start(self, command: Sequence[str]) -> Process:
+        """Run a program on the host."""
+        shell = ["sh", "-c", _OWN_SHARED_MEMORY, "sh", *command]
+        return Process([_IP, "netns", "exec", self.name, *shell])
+
+    def start_module(self, name: str, *arguments: str) -> Process:
+        """Run a module of Python on the host."""
+        return self.start(module(name, *arguments))
 
     def kill(self) -> None:
         """End all processes of the host at once, as the loss of its power does."""

@@ -10,30 +10,30 @@
 """The dashboard before 500 valves, in a real browser: python -m benchmark.load, or `make load`."""
 
 import argparse
+import itertools
 import os
-import socket
 import sys
-import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from urllib.parse import quote
 
-from rich.console import Console
+from playwright.sync_api import Browser
 
+from benchmark.harness.processes import running
+from benchmark.harness.rows import Row, judged, none, opened_console, rows_table
+from benchmark.harness.run import own_folder, quiet_domain
 from benchmark.load.afternoon import afternoon_rows
 from benchmark.load.bounds import bound_rows
-from benchmark.load.browser import launched
-from benchmark.load.pictures import picture_rows, take_manual_picture
-from benchmark.load.processes import running
-from benchmark.load.stage import Stage
-from benchmark.speed.rows import Row
-from benchmark.speed.table import machine_shape, rows_table
-from valve_friction_ros.commands.demo.bench import free_domain
-
-__all__ = ["main"]
+from benchmark.load.plant import identifier_of
+from benchmark.load.stage import LIVE, Stage, launched, wait_on_page
 
 _PARTS = ("bounds", "afternoon", "pictures")
-
-_WIDTH_OF_A_FILE = 120
+_WIDTHS = {390: 844, 1280: 800, 2560: 1440}
+_THEMES = ("light", "dark")
+_SIGNALS = 20_000
+"""Time for the signals of a valve to fill their charts, ms."""
+_SETTLE = 2500
+"""Time for a page to draw all that comes after it, ms."""
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -49,68 +49,83 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _free_port() -> int:
-    with socket.socket() as tried:
-        tried.bind(("127.0.0.1", 0))
-        port: int = tried.getsockname()[1]
-        return port
+def _take_manual_picture(stage: Stage, browser: Browser, path: Path) -> None:
+    """Take the picture of the plant that the manual shows."""
+    stage.say("the picture of the manual")
+    with browser.new_context(viewport={"width": 1400, "height": 700}) as context:
+        page = context.new_page()
+        page.goto(f"{stage.address}/?theme=light")
+        wait_on_page(page, "document.querySelector('.vf-row')")
+        page.wait_for_timeout(_SETTLE)
+        page.screenshot(path=path)
 
 
-def _load() -> str:
-    return f"load {', '.join(f'{one:.2f}' for one in os.getloadavg())}"
-
-
-def _measured(options: argparse.Namespace, console: Console) -> dict[str, list[Row]]:
-    """Run the parts, each before a plant of its own."""
-    found: dict[str, list[Row]] = {}
-
-    def say(line: str) -> None:
-        console.print(f"{line} ({_load()})", highlight=False)
-
-    folder = options.folder or Path(tempfile.mkdtemp(prefix="load_"))
+def _picture_rows(stage: Stage, browser: Browser, folder: Path) -> Iterator[Row]:
+    """Take pictures of all pages, to be looked at; count those that are wider than their window."""
     folder.mkdir(parents=True, exist_ok=True)
-    stage = Stage(folder, options.valves, _free_port())
+    live, other = quote(LIVE), quote(identifier_of(2))
+    pages = {
+        "plant": "/?",
+        "tiles": "/?view=tiles",
+        "nothing": "/?q=xyzzy",
+        "valve": f"/valve?node={live}",
+        "grown": f"/valve?node={other}",
+        "unknown": f"/valve?node={quote('/area_9/no_such_valve/identifier')}",
+        "compare": f"/compare?a={live}&b={other}",
+    }
+    wide, taken = 0, 0
+    for name, path in pages.items():
+        stage.say(f"picture of {name}")
+        settle = _SIGNALS if name == "valve" else _SETTLE
+        for theme, (width, height) in itertools.product(_THEMES, _WIDTHS.items()):
+            with browser.new_context(viewport={"width": width, "height": height}) as context:
+                page = context.new_page()
+                page.goto(f"{stage.address}{path}&theme={theme}")
+                wait_on_page(page, "window.did_handshake")
+                page.wait_for_timeout(settle)
+                wide += page.evaluate("document.documentElement.scrollWidth > innerWidth")
+                page.screenshot(path=folder / f"{name}_{width}_{theme}.png", full_page=True)
+            settle, taken = _SETTLE, taken + 1
+    yield Row("pictures taken", taken)
+    yield none("pages wider than their window", wide)
+
+
+def _measured(options: argparse.Namespace, stage: Stage) -> Iterator[tuple[str, list[Row]]]:
+    """Run the parts, each before a plant of its own."""
     with running(stage.processes), launched() as launch:
-        stage.prepare(say)
+        stage.prepare()
         if "bounds" in options.parts:
-            plant = stage.plant(1.0)
-            stage.dashboard()
-            found["bounds"] = list(bound_rows(stage, launch, options.seconds, options.repeats, say))
-            plant.end()
-            stage.dashboards[-1].end()
+            with stage.shown(1.0):
+                yield "bounds", list(bound_rows(stage, launch, options.seconds, options.repeats))
         if "afternoon" in options.parts:
-            plant = stage.plant(options.rate)
-            stage.dashboard()
-            found["afternoon"] = list(
-                afternoon_rows(stage, launch(), options.minutes, options.seed, say)
-            )
-            plant.end()
-            stage.dashboards[-1].end()
+            with stage.shown(options.rate):
+                use = afternoon_rows(stage, launch(), options.minutes, options.seed)
+                yield "afternoon", list(use)
         if "pictures" in options.parts:
-            plain = stage.plant(1.0, "--still")
-            stage.dashboard()
             browser = launch()
-            say("the picture of the manual")
-            take_manual_picture(stage, browser, folder / "dashboard.png")
-            plain.end()
-            stage.plant(1.0, "--still", "--awkward")
-            found["pictures"] = list(picture_rows(stage, browser, folder / "pictures", say))
-    console.print(f"logs in {folder}", soft_wrap=True)
-    return found
+            with stage.shown(1.0, "--still") as plain:
+                _take_manual_picture(stage, browser, stage.folder / "dashboard.png")
+                plain.end()
+                stage.plant(1.0, "--still", "--awkward")
+                pictures = _picture_rows(stage, browser, stage.folder / "pictures")
+                yield "pictures", list(pictures)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Measure; return 1 if a goal is missed."""
-    options = _parser().parse_args(arguments)
-    console = Console(width=None if sys.stdout.isatty() else _WIDTH_OF_A_FILE)
-    console.print(", ".join(f"{name} {value}" for name, value in machine_shape().items()))
-    os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
-    with free_domain() as domain:
-        os.environ["ROS_DOMAIN_ID"] = str(domain)
-        found = _measured(options, console)
+    options, console = _parser().parse_args(arguments), opened_console()
+
+    def say(line: str) -> None:
+        load = ", ".join(f"{one:.2f}" for one in os.getloadavg())
+        console.print(f"{line} (load {load})", highlight=False)
+
+    with quiet_domain():
+        stage = Stage(own_folder("load", options.folder), options.valves, say)
+        found = dict(_measured(options, stage))
+    console.print(f"logs in {stage.folder}", soft_wrap=True)
     for part, rows in found.items():
         console.print(rows_table(f"{part}: {options.valves} valves", rows))
-    return 1 if any(row.met is False for rows in found.values() for row in rows) else 0
+    return judged([row for rows in found.values() for row in rows], console)
 
 
 if __name__ == "__main__":

@@ -12,7 +12,7 @@
 import itertools
 import random
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 from urllib.parse import quote
@@ -20,12 +20,9 @@ from urllib.parse import quote
 import numpy as np
 from playwright.sync_api import Browser, Page
 
-from benchmark.load.browser import Visit, pages_of, visit
+from benchmark.harness.rows import Row, under
 from benchmark.load.plant import identifier_of
-from benchmark.load.stage import LIVE, Stage
-from benchmark.speed.rows import Row
-
-__all__ = ["afternoon_rows"]
+from benchmark.load.stage import LIVE, Stage, Visit, pages_of, visit
 
 _LOOK = 10.0
 _SETTLED = 0.3
@@ -35,7 +32,6 @@ _GROWTH = 10.0
 _TABS = 4
 _PATIENCE = 60_000.0
 """Longest time until a page is connected, ms."""
-_Say = Callable[[str], None]
 
 
 class _Look(NamedTuple):
@@ -66,7 +62,7 @@ class _Visitor:
 
     def __init__(self, browser: Browser, stage: Stage, seed: int) -> None:
         self._browser, self._stage = browser, stage
-        self._chance = random.Random(seed)  # noqa: S311
+        self._chance = random.Random(seed)
         self._tabs: list[Page] = []
         self.pages = 0
 
@@ -110,25 +106,20 @@ def _searches() -> tuple[Visit, ...]:
 
 
 def _looks(
-    browser: Browser, stage: Stage, seconds: float, seed: int, say: _Say, file: Path
+    browser: Browser, stage: Stage, seconds: float, seed: int, file: Path
 ) -> Iterator[_Look]:
-    process, visitor = stage.dashboards[-1], _Visitor(browser, stage, seed)
+    visitor = _Visitor(browser, stage, seed)
     with browser.new_context() as context, file.open("w", encoding="utf-8") as written:
         wall = visit(context, stage.address, pages_of(stage.valves, LIVE)[0])[1]
         begin = time.monotonic()
         for due in itertools.count(1):
             while time.monotonic() < begin + due * _LOOK:
                 visitor.turn()
-            look = _Look(
-                time.monotonic() - begin,
-                process.memory(),
-                process.threads(),
-                process.open_files(),
-                visitor.pages,
-                _heap(wall),
-            )
+            now = stage.dashboard.usage()
+            held = (now.memory, now.threads, now.files, visitor.pages, _heap(wall))
+            look = _Look(now.time - begin, *held)
             print(*look, sep=",", file=written, flush=True)
-            say(f"{look.time:.0f} s: {look.pages} pages, {look.memory:.1f} MB")
+            stage.say(f"{look.time:.0f} s: {look.pages} pages, {look.memory:.1f} MB")
             yield look
             if look.time > seconds:
                 break
@@ -140,23 +131,18 @@ def _growth(times: np.ndarray, values: np.ndarray) -> float:
     return float(np.polyfit(times, values, 1)[0] * (times[-1] - times[0]))
 
 
-def afternoon_rows(
-    stage: Stage, browser: Browser, minutes: float, seed: int, say: _Say
-) -> Iterator[Row]:
+def afternoon_rows(stage: Stage, browser: Browser, minutes: float, seed: int) -> Iterator[Row]:
     """Use the dashboard for some minutes, and compare what it holds early and late."""
     file = stage.folder / "afternoon.csv"
-    looks = np.array(list(_looks(browser, stage, 60 * minutes, seed, say, file)))
+    looks = np.array(list(_looks(browser, stage, 60 * minutes, seed, file)))
     late = looks[looks[:, 0] > _SETTLED * looks[-1, 0]]
     times = late[:, 0]
     yield Row("pages opened, used and closed", looks[-1, 4], "")
-    grown = _growth(times, late[:, 1])
-    goal = f"under {_GROWTH:g} MB"
     yield Row("memory at the end", late[-1, 1], "MB", late[0, 1], "once settled")
-    yield Row("growth of the memory since then", grown, "MB", goal=goal, met=grown < _GROWTH)
+    grown = _growth(times, late[:, 1])
+    yield under("growth of the memory since then", grown, "MB", _GROWTH)
     for name, column in (("threads", 2), ("open files and sockets", 3)):
-        grown = _growth(times, late[:, column])
         yield Row(name, late[:, column].max(), "", late[0, column], "once settled")
-        yield Row(f"growth of the {name}", grown, "", goal="under 5", met=grown < 5)
-    grown = _growth(times, late[:, 5])
+        yield under(f"growth of the {name}", _growth(times, late[:, column]), "", 5)
     yield Row("the wall screen's own memory", late[-1, 5], "MB", late[0, 5], "once settled")
-    yield Row("growth of that", grown, "MB", goal="under 5 MB", met=grown < 5)
+    yield under("growth of that", _growth(times, late[:, 5]), "MB", 5)

@@ -15,27 +15,20 @@ from collections.abc import Callable, Iterator, Sequence
 
 from playwright.sync_api import Browser
 
-from benchmark.load.browser import Visit, pages_of, visit, wait_on_page
+from benchmark.harness.rows import Row, at_most
 from benchmark.load.plant import identifier_of
-from benchmark.load.processes import Process
-from benchmark.load.stage import LIVE, Stage
-from benchmark.speed.rows import Row
-
-__all__ = ["bound_rows"]
+from benchmark.load.stage import LIVE, Stage, Visit, pages_of, visit, wait_on_page
 
 _READY = 1.0
 _HEALED = 5.0
 _CORES = 0.25
 _MEMORY = 200.0
 _SETTLE = 5.0
-_Say = Callable[[str], None]
 
 
 def _row(item: str, times: Sequence[float], limit: float) -> Row:
     """Return the longest of some times, beside their median."""
-    longest = max(times)
-    goal = f"at most {limit:g} s"
-    return Row(item, longest, "s", statistics.median(times), "median", goal, longest <= limit)
+    return at_most(item, max(times), "s", limit, statistics.median(times), "median")
 
 
 def _ready(browser: Browser, address: str, one: Visit, repeats: int) -> Iterator[Row]:
@@ -49,17 +42,8 @@ def _ready(browser: Browser, address: str, one: Visit, repeats: int) -> Iterator
     yield _row(f"{one.name}: ready, later visit", later, _READY)
 
 
-def _usage(process: Process, seconds: float) -> tuple[float, float]:
-    """Return the cores that a process uses for some seconds, and its memory after them, MB."""
-    time.sleep(_SETTLE)
-    begin, used = time.monotonic(), process.processor()
-    time.sleep(seconds)
-    cores = (process.processor() - used) / (time.monotonic() - begin)
-    return cores, process.memory()
-
-
 def _usage_rows(
-    browser: Browser, stage: Stage, process: Process, visits: Sequence[Visit], seconds: float
+    browser: Browser, stage: Stage, visits: Sequence[Visit], seconds: float
 ) -> Iterator[Row]:
     for opened, name in (
         ([], "no page open"),
@@ -69,11 +53,12 @@ def _usage_rows(
         with browser.new_context() as context:
             for one in opened:
                 visit(context, stage.address, one)
-            cores, memory = _usage(process, seconds)
-        goal = f"at most {_CORES:g} cores"
-        yield Row(f"{name}: processor", cores, "cores", goal=goal, met=cores <= _CORES)
-        goal = f"at most {_MEMORY:g} MB"
-        yield Row(f"{name}: memory", memory, "MB", goal=goal, met=memory <= _MEMORY)
+            time.sleep(_SETTLE)
+            before = stage.dashboard.usage()
+            time.sleep(seconds)
+            after = stage.dashboard.usage()
+        yield at_most(f"{name}: processor", after.cores_since(before), "cores", _CORES)
+        yield at_most(f"{name}: memory", after.memory, "MB", _MEMORY)
 
 
 def _healed(stage: Stage, launch: Callable[[], Browser], repeats: int) -> Iterator[Row]:
@@ -84,7 +69,7 @@ def _healed(stage: Stage, launch: Callable[[], Browser], repeats: int) -> Iterat
         "&& !document.querySelector('.vf-is-silent, .vf-is-unheard')"
     )
     times: dict[str, list[float]] = {"identifier": [], "dashboard": [], "browser": []}
-    started: dict[str, list[float]] = {"dashboard": []}
+    started: list[float] = []
     for turn in range(repeats):
         begin = time.monotonic()
         browser = launch()
@@ -94,13 +79,12 @@ def _healed(stage: Stage, launch: Callable[[], Browser], repeats: int) -> Iterat
             wait_on_page(page, is_live)
             origin = page.evaluate("performance.timeOrigin")
 
-            stage.dashboards[-1].kill()
+            stage.dashboard.kill()
             begin = time.monotonic()
-            made = stage.dashboard()
-            started["dashboard"].append(time.monotonic() - begin)
+            stage.show()
+            started.append(time.monotonic() - begin)
             wait_on_page(page, f"performance.timeOrigin !== {origin} && {is_live}")
             times["dashboard"].append(time.monotonic() - begin)
-            del made
 
             tag = f"LIVE-{turn + 2}"
             stage.live.kill()
@@ -112,24 +96,24 @@ def _healed(stage: Stage, launch: Callable[[], Browser], repeats: int) -> Iterat
         browser.close()
     for name, some in times.items():
         yield _row(f"healed after a restart: {name}", some, _HEALED)
-    yield Row("of it, until the dashboard listens", max(started["dashboard"]), "s")
+    yield Row("of it, until the dashboard listens", max(started), "s")
 
 
 def bound_rows(
-    stage: Stage, launch: Callable[[], Browser], seconds: float, repeats: int, say: _Say
+    stage: Stage, launch: Callable[[], Browser], seconds: float, repeats: int
 ) -> Iterator[Row]:
     """Measure all bounds at 1 Hz."""
     visits = pages_of(stage.valves, identifier_of(3))
     browser = launch()
-    say("waiting for all valves")
+    stage.say("waiting for all valves")
     with browser.new_context() as context:
         page = visit(context, stage.address, visits[0])[1]
         wait_on_page(page, "!document.querySelector('.vf-is-unheard')")
     for one in visits:
-        say(f"opening {one.name}")
+        stage.say(f"opening {one.name}")
         yield from _ready(browser, stage.address, one, repeats)
-    say("what the dashboard takes")
-    yield from _usage_rows(browser, stage, stage.dashboards[-1], visits, seconds)
+    stage.say("what the dashboard takes")
+    yield from _usage_rows(browser, stage, visits, seconds)
     browser.close()
-    say("restarts")
+    stage.say("restarts")
     yield from _healed(stage, launch, repeats)

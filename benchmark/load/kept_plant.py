@@ -33,8 +33,6 @@ from valve_friction_ros.model import BENCH_VALVE
 from valve_friction_ros.streams import DAY
 from valve_friction_ros.wording import quoted
 
-__all__ = ["write_history"]
-
 _EVERY = 7 * DAY
 _SETTINGS = settings_text(MonitorSettings(BENCH_VALVE))
 
@@ -75,7 +73,7 @@ def write_history(path: Path, valves: int, weeks: int = 52) -> None:
     now = time.time_ns()
     with writing(path) as connection:
         for index in range(valves):
-            chance = random.Random(index)  # noqa: S311
+            chance = random.Random(index)
             valve = KeptValve(identifier_of(index), tag_of(index))
             number, healthy = valve_id(connection, valve), chance.uniform(150, 900)
             ratio = ratio_of(index)

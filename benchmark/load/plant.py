@@ -32,8 +32,6 @@ from rclpy.signals import SignalHandlerOptions
 
 from valve_friction_ros.nodes.plumbing.qos import LATCHED
 
-__all__ = ["identifier_of", "main", "ratio_of", "tag_of"]
-
 _BEGIN = time.time()
 _BEATS = 4
 """Seconds after which the counters of a valve begin again."""
@@ -80,10 +78,10 @@ def tag_of(index: int) -> str:
 def status_of(template: DiagnosticStatus, index: int, beat: int) -> DiagnosticStatus:
     """Return what the identifier of a valve says at a beat: the template, with its own numbers."""
     anew = beat >= _BEATS
-    chance = random.Random(1000 * index + (beat if anew else 0))  # noqa: S311
+    chance = random.Random(1000 * index + (beat if anew else 0))
     level, letter, ratio, words = _KINDS[index % len(_KINDS)]
     ratio *= chance.uniform(0.98, 1.02)
-    size = random.Random(index).uniform(0.5, 2.0)  # noqa: S311
+    size = random.Random(index).uniform(0.5, 2.0)
     made = time.time() if anew else _BEGIN - chance.uniform(60, 86_400)
     own = {
         "NE 107": letter,
@@ -158,7 +156,7 @@ def _publish(
     arrays = [[_diagnostics(status) for status in beats] for beats in known]
     latched = [[serialize_message(status) for status in beats] for beats in known]
     del known
-    print("publishing", flush=True)  # noqa: T201 - who has started it waits for this
+    print("publishing", flush=True)  # who has started it waits for this
     for beat, index in _due(count, rate):
         if index == beat % every and beat >= _BEATS and every == count:
             anew = status_of(template, index, beat)

@@ -7,100 +7,102 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The plant, the dashboard and one real valve, as processes of their own in a domain of theirs."""
+"""The plant, the dashboard and one real valve, as processes; and a real browser before them."""
 
-import os
+import contextlib
+import shutil
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from urllib.parse import quote
 
-import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from rclpy.executors import SingleThreadedExecutor
+from playwright.sync_api import Browser, BrowserContext, Error, Page, sync_playwright
 from rclpy.serialization import serialize_message
-from rclpy.signals import SignalHandlerOptions
 
+from benchmark.harness.participant import Participant
+from benchmark.harness.processes import Process, free_port, module, parameters
 from benchmark.load.kept_plant import write_history
-from benchmark.load.processes import Process, node_arguments
 from valve_friction_ros.nodes.service_call import caller
-
-__all__ = ["LIVE", "Stage"]
 
 LIVE = "/live_1/identifier"
 """The identifier of the real valve."""
 _RECORD = 14.0
 """Length of its record, s: more than a period of its pressure."""
 _ANSWER = 600.0
+_PATIENCE = 60.0
+_FIRST_SCREEN = 40
+"""Rows that a tall screen shows at once."""
+_LOOK = """
+(() => {
+  const look = () => {
+    let ready = false;
+    try { ready = Boolean(window.did_handshake && (%s)); } catch (error) { ready = false; }
+    if (ready) window.__ready = performance.now(); else requestAnimationFrame(look);
+  };
+  requestAnimationFrame(look);
+})()"""
+"""Notes, each time that a picture is drawn, whether the page is ready: drawn, and connected."""
+
+Say = Callable[[str], None]
 
 
 class Stage:
-    """Starts the processes, and knows them.
+    """Starts the processes, and knows them; history and logs are in a folder."""
 
-    Parameters
-    ----------
-    folder : Path
-        Of the history and the logs.
-    valves : int
-        Number of the simulated valves.
-    port : int
-        Where the dashboard listens.
-    """
-
-    def __init__(self, folder: Path, valves: int, port: int) -> None:
-        self.folder, self.valves, self.port = folder, valves, port
-        self.address = f"http://127.0.0.1:{port}"
+    def __init__(self, folder: Path, valves: int, say: Say) -> None:
+        self.folder, self.valves, self.say, self._port = folder, valves, say, free_port()
+        self.address = f"http://127.0.0.1:{self._port}"
         self.processes: list[Process] = []
-        self.dashboards: list[Process] = []
-        self._count = 0
         self._history = folder / "history.sqlite"
         self._template = folder / "status.cdr"
 
-    def start(self, module: str, arguments: list[str]) -> Process:
+    def _start(self, name: str, *arguments: str) -> Process:
         """Start a module of Python."""
-        self._count += 1
-        log = self.folder / f"{module.rpartition('.')[2]}_{self._count}.log"
-        made = Process(module, arguments, log)
+        log = self.folder / f"{name.rpartition('.')[2]}_{len(self.processes) + 1}.log"
+        made = Process(module(name, *arguments), log)
         self.processes.append(made)
         return made
 
-    def _node(self, name: str, namespace: str, parameters: dict[str, object]) -> Process:
-        return self.start(f"valve_friction_ros.nodes.{name}", node_arguments(namespace, parameters))
+    def _node(self, name: str, place: str, **given: object) -> Process:
+        words = ["--ros-args", "--log-level", "info", *(["-r", f"__ns:={place}"] if place else [])]
+        return self._start(f"valve_friction_ros.nodes.{name}", *words, *parameters(**given))
 
-    def identifier(self, tag: str) -> Process:
+    def identifier(self, tag: str) -> None:
         """Start the identifier of the real valve, under a tag."""
-        self.live = self._node(
-            "identifier",
-            "/live_1",
-            {"valve_tag": tag, "history_file": self._history, "window": 60.0},
-        )
-        return self.live
+        known = {"valve_tag": tag, "history_file": self._history, "window": 60.0}
+        self.live = self._node("identifier", "/live_1", **known)
 
-    def dashboard(self) -> Process:
+    def show(self) -> None:
         """Start the dashboard, and wait until it can be opened."""
-        made = self._node("dashboard", "", {"port": self.port, "history_file": self._history})
-        made.wait_for("ready: open")
-        self.dashboards.append(made)
-        return made
+        known = {"port": self._port, "history_file": self._history}
+        self.dashboard = self._node("dashboard", "", **known)
+        self.dashboard.wait_for("ready: open")
 
     def plant(self, rate: float, *more: str) -> Process:
         """Start the simulated valves, and wait until they publish."""
-        arguments = [str(self._template), "--valves", str(self.valves), "--rate", str(rate), *more]
-        made = self.start("benchmark.load.plant", arguments)
+        given = ("--valves", str(self.valves), "--rate", str(rate), *more)
+        made = self._start("benchmark.load.plant", str(self._template), *given)
         made.wait_for("publishing")
         return made
 
-    def prepare(self, say: Callable[[str], None]) -> None:
+    @contextlib.contextmanager
+    def shown(self, rate: float, *more: str) -> Iterator[Process]:
+        """Provide a plant that the dashboard shows."""
+        with self.plant(rate, *more) as plant:
+            self.show()
+            yield plant
+        self.dashboard.end()
+
+    def prepare(self) -> None:
         """Write the history, and let a real valve say what the simulated ones will say."""
-        say(f"writing the history of {self.valves} valves")
+        self.say(f"writing the history of {self.valves} valves")
         write_history(self._history, self.valves)
-        say("identifying a simulated valve by real nodes")
+        self.say("identifying a simulated valve by real nodes")
         self.identifier("LIVE-1")
-        self._node("simulator", "/live_1", {"position_noise": 1e-5, "noise_seed": 1})
-        self._node(
-            "pressure_source",
-            "/live_1",
-            {"excitation": "sine", "sample_rate": 100.0, "pressure_noise": 20.0, "noise_seed": 2},
-        )
+        self._node("simulator", "/live_1", position_noise=1e-5, noise_seed=1)
+        drive = {"excitation": "sine", "sample_rate": 100.0, "pressure_noise": 20.0}
+        self._node("pressure_source", "/live_1", **drive, noise_seed=2)
         with caller(lambda: True) as client:
             identifier = client.find(LIVE, _ANSWER)
             time.sleep(_RECORD)
@@ -122,19 +124,65 @@ def _heard() -> bytes:
             if any(value.key == "friction_ratio" for value in status.values)
         )
 
-    context = rclpy.Context()
-    rclpy.init(args=[], context=context, signal_handler_options=SignalHandlerOptions.NO)
-    node = rclpy.create_node("listener", context=context, enable_rosout=False)
-    executor = SingleThreadedExecutor(context=context)
-    executor.add_node(node)
-    node.create_subscription(DiagnosticArray, "/diagnostics", note, 100)
-    deadline = time.monotonic() + _ANSWER
-    while not found and time.monotonic() < deadline:
-        executor.spin_once(timeout_sec=0.1)
-    executor.shutdown()
-    node.destroy_node()
-    context.try_shutdown()
-    if not found:
-        raise RuntimeError(f"{LIVE} says no ratio of its friction (pid {os.getpid()})")
+    with Participant("listener") as listener:
+        listener.node.create_subscription(DiagnosticArray, "/diagnostics", note, 100)
+        if not listener.wait(lambda: bool(found), _ANSWER):
+            raise RuntimeError(f"{LIVE} says no ratio of its friction")
     raw: bytes = serialize_message(found[-1])
     return raw
+
+
+class Visit:
+    """A page to measure: its path, and the expression that is true once it shows all it should."""
+
+    def __init__(self, name: str, path: str, is_ready: str) -> None:
+        self.name, self.path, self.is_ready = name, path, is_ready
+
+
+def pages_of(valves: int, identifier: str) -> tuple[Visit, ...]:
+    """Return the pages with what each shows of so many valves, and of one of them."""
+    all_drawn = f"document.querySelectorAll('.vf-row, .vf-tile').length >= {valves}"
+    node = quote(identifier)
+    valve = (
+        "document.querySelector('.vf-parameters') "
+        "&& document.querySelector('.vf-chart-trend canvas')"
+    )
+    first_screen = f"document.querySelectorAll('.vf-row').length >= {min(valves, _FIRST_SCREEN)}"
+    compared = "document.querySelector('.vf-compared tbody')"
+    return (
+        Visit("plant, table", "/", all_drawn),
+        Visit("plant, tiles", "/?view=tiles", all_drawn),
+        Visit("plant, first screen", "/", first_screen),
+        Visit("valve", f"/valve?node={node}", valve),
+        Visit("compare", f"/compare?a={node}&b={node}", compared),
+    )
+
+
+@contextlib.contextmanager
+def launched() -> Iterator[Callable[[], Browser]]:
+    """Provide a function that starts the system's Chromium."""
+    path = shutil.which("chromium") or shutil.which("chromium-browser")
+    if path is None:
+        raise RuntimeError("there is no Chromium: run `make browser`")
+    with sync_playwright() as engine:
+        yield lambda: engine.chromium.launch(executable_path=path, args=["--no-sandbox"])
+
+
+def visit(context: BrowserContext, address: str, one: Visit) -> tuple[float, Page]:
+    """Open a page in a new tab; return the time until it was ready, s, and the tab."""
+    page = context.new_page()
+    page.add_init_script(_LOOK % one.is_ready)
+    page.goto(address + one.path, wait_until="commit")
+    ready = page.wait_for_function("window.__ready", timeout=1e3 * _PATIENCE)
+    return float(ready.json_value()) / 1e3, page
+
+
+def wait_on_page(page: Page, expression: str) -> None:
+    """Wait until an expression is true, also over reloads."""
+    end = time.monotonic() + _PATIENCE
+    while time.monotonic() < end:
+        with contextlib.suppress(Error):  # a page that is being loaded
+            if page.evaluate(f"Boolean({expression})"):
+                return
+        page.wait_for_timeout(20)
+    raise RuntimeError(f"not within {_PATIENCE:g} s: {expression}")

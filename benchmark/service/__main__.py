@@ -20,12 +20,9 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from rich.console import Console
 
 from benchmark.service.course import Task
-from benchmark.service.drawn import PREFIX
-from benchmark.service.plants import PLANTS
+from benchmark.service.plants import PLANTS, PREFIX
 from benchmark.service.report import bounds_met, tables
 from benchmark.service.trial import Told, tried
-
-__all__ = ["main"]
 
 _BRIEF = ("low", "high", "graphite", "stick-slip")
 _WIDTH_OF_A_FILE = 150

@@ -15,14 +15,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from benchmark.service.drawn import valve_of
-from benchmark.service.plants import Duty, ServiceValve
+from benchmark.service.plants import Duty, ServiceValve, valve_of
 from benchmark.service.service import STRETCH, Stretch, stretches
 from valve_friction_ros.evidence import Move, MoveStream
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.streams import Arrivals
-
-__all__ = ["BEFORE", "PER_HOUR", "Course", "Served", "Task", "known_valve", "served"]
 
 PER_HOUR = round(3600.0 / STRETCH)
 """Stretches of an hour."""

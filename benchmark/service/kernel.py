@@ -23,8 +23,6 @@ from benchmark.reality.plants.kernel import stem_pull
 from benchmark.reality.plants.laws import INNER, V, X
 from benchmark.reality.plants.parameters import Law
 
-__all__ = ["SUMS", "Loop", "new_state", "runner_of"]
-
 SUMS = 2
 """Sums over the motion: ∫|dx| and ∫|F·dx|."""
 

@@ -7,17 +7,18 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The valves in service, their loops and their sensors."""
+"""The valves in service, their loops and their sensors; some drawn, each from its own number."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
-from benchmark.reality.plants import PACKINGS, Friction, Law, Plant, Trend
+import numpy as np
+
+from benchmark.reality.plants import PACKINGS, Body, Friction, Law, Plant, Trend
 from benchmark.reality.plants.parameters import PRESSURE_RANGE
 from benchmark.service.kernel import Loop
-
-__all__ = ["PLANTS", "Duty", "Senses", "ServiceValve"]
 
 
 @dataclass(frozen=True)
@@ -130,3 +131,91 @@ PLANTS: Mapping[str, ServiceValve] = MappingProxyType(
     }
 )
 """The paper's packings in closed loop, and what plants add to them."""
+
+PREFIX = "drawn"
+"""Of the name of a drawn valve; its number follows."""
+
+_LAWS = (Law.MOREAU, Law.MOREAU, Law.KARNOPP, Law.LATCHED, Law.LATCHED, Law.LUGRE, Law.MAXWELL)
+_STEPS = {Law.KARNOPP: 2e-5, Law.LATCHED: 2e-5, Law.LUGRE: 8e-5, Law.MAXWELL: 4e-5}
+
+
+def valve_of(name: str) -> ServiceValve:
+    """Return a valve of `PLANTS`, or the one drawn from the number after `PREFIX`."""
+    prefix, _, number = name.partition(" ")
+    return _drawn(int(number)) if prefix == PREFIX else PLANTS[name]
+
+
+def _drawn(number: int) -> ServiceValve:
+    random = np.random.default_rng([number, 14])
+    friction = _friction(random)
+    body = list(PACKINGS.values())[random.integers(len(PACKINGS))].body
+    body = Body(
+        mass=_between(random, 1.0, 4.0),
+        spring=_between(random, 1.3e5, 3e5),
+        preload=body.preload,
+        pressure_reference=body.pressure_reference,
+        spring_curve=random.uniform(-0.04, 0.04),
+        flow_force=random.choice([0.0, random.uniform(0.0, 200.0)]),
+    )
+    low = body.preload / body.area + body.pressure_reference
+    span = body.spring * body.travel / body.area
+    loop = Loop(
+        gain=_between(random, 0.8, 3.0),
+        integral_time=_between(random, 1.5, 6.0),
+        action_period=0.1,
+        process_lag=_between(random, 0.15, 0.6),
+        bottom=low - 0.1 * span,
+        span=1.2 * span,
+        converter_lag=_between(random, 0.2, 1.2),
+    )
+    middle = random.uniform(0.4, 0.6)
+    return ServiceValve(
+        Plant(body, friction),
+        _step(friction, body.mass),
+        loop,
+        Duty(low=middle - 0.2, high=middle + 0.2),
+        _senses(random),
+    )
+
+
+def _between(random: np.random.Generator, low: float, high: float) -> float:
+    """Return a number whose logarithm is uniform."""
+    return float(math.exp(random.uniform(math.log(low), math.log(high))))
+
+
+def _friction(random: np.random.Generator) -> Friction:
+    law = _LAWS[random.integers(len(_LAWS))]
+    coulomb = _between(random, 120.0, 900.0)
+    at_once = law in (Law.KARNOPP, Law.LATCHED)
+    bends = law in (Law.LUGRE, Law.MAXWELL)
+    return Friction(
+        coulomb=coulomb,
+        static=coulomb * random.uniform(1.0, 1.5 if bends else 2.0),
+        viscous=_between(random, 4e3, 8e4),
+        stribeck_velocity=0.0 if at_once else _between(random, 1e-3, 5e-3),
+        law=law,
+        presliding=random.uniform(5e-6, 25e-6) if bends else 0.0,
+        limit_velocity=1e-4,
+        asymmetry=random.uniform(-0.1, 0.1),
+        along_travel=Trend(random.uniform(-0.2, 0.2)),
+    )
+
+
+def _step(friction: Friction, mass: float) -> float:
+    if friction.law is not Law.MOREAU:
+        return _STEPS[friction.law]
+    fall = (friction.static - friction.coulomb) / friction.stribeck_velocity
+    return float(np.clip(0.5 * mass / max(fall - friction.viscous, 1.0), 6e-6, 8e-5))
+
+
+def _senses(random: np.random.Generator) -> Senses:
+    return Senses(
+        rate=float(random.choice([20.0, 25.0, 40.0, 50.0])),
+        position_noise=random.uniform(5e-6, 15e-6),
+        pressure_noise=random.uniform(50.0, 300.0),
+        position_step=float(random.choice([0.0, 30e-6, 71e-6])),
+        pressure_step=float(random.choice([0.0, 100.0, 200.0])),
+        jitter=random.uniform(0.0, 0.1),
+        lag=random.uniform(-0.03, 0.05),
+        hold=int(random.choice([1, 1, 4])),
+    )

@@ -18,28 +18,20 @@ from rich.table import Table
 
 from benchmark.service.trial import Number, Told
 
-__all__ = ["bounds_met", "tables"]
-
 _NAMES = ("sliding_friction", "static_friction", "dead_band")
 _SPREAD = "alternating"
 """Valve whose set points hardly leave their place: its dead band may be wide, if it says so."""
 
 
-def _errors(numbers: Iterable[Number]) -> tuple[int, int, float, float, float]:
+def _errors(numbers: Sequence[Number]) -> tuple[int, int, float, float, float]:
     """Return how many there are, how many withheld, median and largest error, and coverage."""
-    every = list(numbers)
-    known = [one for one in every if math.isfinite(one.value)]
+    known = [one for one in numbers if math.isfinite(one.value)]
     if not known:
-        return len(every), len(every), math.nan, math.nan, math.nan
+        return len(numbers), len(numbers), math.nan, math.nan, math.nan
     errors = np.array([abs(one.value / one.truth - 1) for one in known])
     inside = np.mean([abs(one.value - one.truth) <= one.half_width for one in known])
-    return (
-        len(every),
-        len(every) - len(known),
-        float(np.median(errors)),
-        float(errors.max()),
-        float(inside),
-    )
+    withheld = len(numbers) - len(known)
+    return len(numbers), withheld, float(np.median(errors)), float(errors.max()), float(inside)
 
 
 def _by_plant(told: Sequence[Told]) -> Iterator[tuple[str, list[Told]]]:
@@ -47,52 +39,48 @@ def _by_plant(told: Sequence[Told]) -> Iterator[tuple[str, list[Told]]]:
         yield name, [one for one in told if one.task.plant == name]
 
 
+def _of(told: Iterable[Told], name: str) -> list[Number]:
+    return [number for one in told for number in one.numbers if number.name == name]
+
+
+def _in_course(told: Sequence[Told], *courses: str) -> list[Told]:
+    return [one for one in told if one.task.course in courses]
+
+
 def _hourly(told: Sequence[Told]) -> Table:
-    table = Table(title="numbers of single hours, beside the truth")
-    for column in ("valve", "number", "hours", "withheld", "median", "largest", "inside"):
-        table.add_column(column)
+    columns = ("valve", "number", "hours", "withheld", "median", "largest", "inside")
+    table = Table(*columns, title="numbers of single hours, beside the truth")
     for plant, group in _by_plant(told):
         for name in _NAMES:
-            numbers = [n for one in group for n in one.numbers if n.name == name]
-            count, withheld, median, largest, inside = _errors(numbers)
-            row = (f"{median:.1%}", f"{largest:.1%}", f"{inside:.1%}")
+            count, withheld, *shares = _errors(_of(group, name))
+            row = (f"{share:.1%}" for share in shares)
             table.add_row(plant, name, str(count), str(withheld), *row)
     return table
 
 
 def _steady(told: Sequence[Told]) -> Table:
-    table = Table(title="without change")
-    for column in ("valve", "hours", "declared changes", "alarms"):
-        table.add_column(column)
-    for plant, group in _by_plant([one for one in told if one.task.course == "steady"]):
-        hours = sum(one.task.hours for one in group)
-        changes, alarms = sum(one.changes for one in group), sum(one.alarms for one in group)
-        table.add_row(plant, str(hours), str(changes), str(alarms))
+    table = Table("valve", "hours", "declared changes", "alarms", title="without change")
+    for plant, group in _by_plant(_in_course(told, "steady")):
+        counts = [(one.task.hours, one.changes, one.alarms) for one in group]
+        table.add_row(plant, *(str(sum(column)) for column in zip(*counts, strict=True)))
     return table
 
 
 def _grown(told: Sequence[Told]) -> Table:
-    table = Table(title="friction grows to 1.5 times")
-    for column in (
-        "valve",
-        "course",
-        "declared [h]",
-        "alarm [h]",
-        "without baseline [h]",
-        "dated",
-        "early",
-        "last error",
-    ):
-        table.add_column(column)
+    times = {
+        "declared": "declared [h]",
+        "alarmed": "alarm [h]",
+        "alarmed_by_reference": "without baseline [h]",
+    }
+    columns = ("valve", "course", *times.values(), "dated", "early", "last error")
+    table = Table(*columns, title="friction grows to 1.5 times")
     for course in ("step", "slow", "weeks"):
-        for plant, group in _by_plant([one for one in told if one.task.course == course]):
+        for plant, group in _by_plant(_in_course(told, course)):
             last = [n for one in group for n in one.late if n.name == "sliding_friction"]
             table.add_row(
                 plant,
                 course,
-                ", ".join(f"{one.declared:.2f}" for one in group),
-                ", ".join(f"{one.alarmed:.2f}" for one in group),
-                ", ".join(f"{one.alarmed_by_reference:.2f}" for one in group),
+                *(", ".join(f"{getattr(one, name):.2f}" for one in group) for name in times),
                 ", ".join(str(one.dated) for one in group) if course == "step" else "",
                 str(sum(one.changes + one.alarms for one in group)),
                 f"{_errors(last)[3]:.1%}",
@@ -121,36 +109,21 @@ def _covers(numbers: Sequence[Number]) -> bool:
 
 def bounds_met(told: Sequence[Told], console: Console) -> bool:
     """Print each bound and what was reached; return whether all are met."""
-    numbers = {
-        (plant, name): [n for one in group for n in one.numbers if n.name == name]
-        for plant, group in _by_plant(told)
-        for name in _NAMES
-    }
-    sliding = [n for (_, name), found in numbers.items() if name == _NAMES[0] for n in found]
-    spread = [
-        n
-        for one in told
-        for n in one.numbers
-        if n.name == "dead_band" and one.task.plant != _SPREAD
-    ]
-    steady = [one for one in told if one.task.course == "steady"]
-    steps = [one for one in told if one.task.course == "step"]
-    slow = [one for one in told if one.task.course in ("slow", "weeks")]
+    every = [[_of(group, name) for name in _NAMES] for _, group in _by_plant(told)]
+    steady, steps = _in_course(told, "steady"), _in_course(told, "step")
+    slow = _in_course(told, "slow", "weeks")
     hours = sum(one.task.hours for one in steady)
+    spread = _of([one for one in told if one.task.plant != _SPREAD], "dead_band")
     found = (
-        ("sliding friction within 10 %, in every hour", _within(sliding)),
+        ("sliding friction within 10 %, in every hour", _within(_of(told, _NAMES[0]))),
         ("dead band within 10 %, where set points leave their place", _within(spread)),
         (
             "at least 95 % inside their intervals, of each number",
-            all(
-                _errors([n for (_, one), found in numbers.items() if one == name for n in found])[4]
-                >= 0.95
-                for name in _NAMES
-            ),
+            all(_errors(_of(told, name))[4] >= 0.95 for name in _NAMES),
         ),
         (
             "at least 95 % inside their intervals, of each valve and number",
-            all(_covers(one) for one in numbers.values()),
+            all(_covers(one) for numbers in every for one in numbers),
         ),
         (
             f"no false declaration in {hours} h, nor before a change",

@@ -20,8 +20,6 @@ from benchmark.reality.plants.constants import constants
 from benchmark.service.kernel import SUMS, new_state, runner_of
 from benchmark.service.plants import Duty, Senses, ServiceValve
 
-__all__ = ["STRETCH", "Stretch", "stretches"]
-
 STRETCH = 600.0
 """Length of a stretch, s."""
 
@@ -92,16 +90,10 @@ def stretches(
     duty: Callable[[float], Duty],
     spacing: float = STRETCH,
 ) -> Iterator[Stretch]:
-    """Serve for some hours.
+    """Serve for some hours, by a seed of set points and noise; yield ten minutes at a time.
 
     Parameters
     ----------
-    valve : ServiceValve
-        The valve.
-    hours : float
-        Length of the service.
-    seed : int
-        Of set points and noise.
     friction : callable
         Friction at an hour, over that of the plant.
     offset : callable
@@ -111,11 +103,6 @@ def stretches(
     spacing : float
         Time, s, from the begin of one stretch to that of the next; between them the valve is shut
         off, as it stands.
-
-    Yields
-    ------
-    Stretch
-        Ten minutes each.
     """
     random = np.random.default_rng([seed, 7])
     loop, senses, plant = valve.loop, valve.senses, valve.plant

@@ -18,8 +18,7 @@ from dataclasses import dataclass, field
 from benchmark.reality.plants.constants import constants
 from benchmark.reality.plants.kernel import stem_pull
 from benchmark.service.course import BEFORE, PER_HOUR, Course, Served, Task, known_valve, served
-from benchmark.service.drawn import valve_of
-from benchmark.service.plants import ServiceValve
+from benchmark.service.plants import ServiceValve, valve_of
 from valve_friction_ros.evidence import MOST_MOVES, Evidence, Move, evidence_of
 from valve_friction_ros.health import (
     Baseline,
@@ -32,8 +31,6 @@ from valve_friction_ros.health import (
 )
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.model.valve import Valve
-
-__all__ = ["Number", "Told", "judged", "tried"]
 
 _BEGIN = 1_700_000_000
 _SAME = 3600e9

@@ -18,24 +18,19 @@ import time
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
-from benchmark.churn.endurance import add_run_arguments, endured
-from benchmark.churn.ledger import Ledger
-from benchmark.churn.places import Node, parameter_words
-from benchmark.postgres_server import why_no_server
-from benchmark.soak.database import Kept, own_database
-from benchmark.soak.disk import small_disk
+from benchmark.churn.places import BENCH
+from benchmark.harness.postgres import why_no_server
+from benchmark.harness.processes import node, parameters
+from benchmark.harness.rows import Row
+from benchmark.harness.run import Ledger, endured, run_parser
 from benchmark.soak.faults import FAULTS, Site, settled
-from benchmark.soak.feed import Feed, Piece
-from benchmark.soak.nonsense import PERIOD
-from benchmark.soak.plant import Plant, Process
+from benchmark.soak.feed import PERIOD, Feed, Piece
+from benchmark.soak.plant import SERVICES, Plant, Process
+from benchmark.soak.site import own_database, small_disk
 from benchmark.soak.summary import database_rows, rows
-from benchmark.speed.rows import Row
 from valve_friction_ros.history import HistoryFile
 
-__all__ = ["main"]
-
 _MONTH = 30 * 86_400 * 10**9
-_BENCH = Path(__file__).resolve().parents[2] / "config" / "bench_low.yaml"
 _GROWTH = {"/fv_101": 1.0, "/fv_102": 1.6, "/fv_201": 1.0, "/fv_202": 2.5}
 _OF_NOW = "/fv_301"
 """Valve whose sensors speak by the clock of now; theirs is the nonsense."""
@@ -44,19 +39,19 @@ _PAUSE = 3.0
 """Mean time between two records of a valve, s."""
 _CALM = 6.0
 """Mean time between two faults, s."""
-_ASKED, _OTHERS = 0.6, ("set_baseline", "save", "report")
+_ASKED, _OTHERS = 0.6, SERVICES[1:]
 _OTHER = 0.03
 _START_LIMIT = 120.0
 _LOOKS = (0.1, 0.25, 0.5, 0.75)
 """Shares of the month at which the memory is looked at, besides its end."""
 
 
-def _processes(folder: Path, disk: Path, url: str) -> tuple[Process, ...]:
+def _processes(folder: Path, disk: Path, url: str) -> list[Process]:
     """Start identifiers of one valve each, and a process of two that lives through all."""
     common = [
         "--params-file",
-        str(_BENCH),
-        *parameter_words(
+        str(BENCH),
+        *parameters(
             history_file=disk / "history.sqlite",
             save_folder=folder / "saved",
             report_folder=folder / "reports",
@@ -67,31 +62,18 @@ def _processes(folder: Path, disk: Path, url: str) -> tuple[Process, ...]:
             **({"history_url": url} if url else {}),
         ),
     ]
-    *single, first, second = _GROWTH
-    found = [
-        Process(
-            valve.strip("/"),
-            Node("identifier", ["-r", f"__ns:={valve}", *common]),
-            (valve,),
-            folder / f"{valve.strip('/')}.log",
-        )
-        for valve in single
+
+    def single(valve: str, *more: str) -> Process:
+        command = node("identifier", "-r", f"__ns:={valve}", *common, *more)
+        return Process(valve.strip("/"), folder, (valve,), command)
+
+    *singles, first, second = _GROWTH
+    many = node("identifiers", *common, *parameters(valves=f"[{first},{second}]"))
+    return [
+        *map(single, singles),
+        single(_OF_NOW, *parameters(clock_tolerance=60.0)),
+        Process("identifiers", folder, (first, second), many),
     ]
-    many = Node("identifiers", [*common, *parameter_words(valves=f"[{first},{second}]")])
-    of_now = Process(
-        _OF_NOW.strip("/"),
-        Node(
-            "identifier",
-            ["-r", f"__ns:={_OF_NOW}", *common, *parameter_words(clock_tolerance=60.0)],
-        ),
-        (_OF_NOW,),
-        folder / f"{_OF_NOW.strip('/')}.log",
-    )
-    return (
-        *found,
-        of_now,
-        Process("identifiers", many, (first, second), folder / "identifiers.log"),
-    )
 
 
 class _Month:
@@ -113,25 +95,26 @@ class _Month:
 
     def turn(self) -> None:
         """Send a piece to each valve that works, and let faults go on."""
-        for valve in self._site.feeds:
+        site = self._site
+        for valve in site.feeds:
             self._feed(valve)
-        self._speak()
-        self._faults = [one for one in self._faults if next(one, self) is None]
+        self._go_on()
         if time.monotonic() > self._next_fault:
-            self._next_fault = time.monotonic() + self._site.chance.expovariate(1 / _CALM)
+            self._next_fault = time.monotonic() + site.chance.expovariate(1 / _CALM)
             names, weights = list(FAULTS), [weight for _, weight in FAULTS.values()]
-            (name,) = self._site.chance.choices(names, weights)
-            self._site.plant.ledger.add("fault", name=name, share=self.share)
-            self._faults.append(FAULTS[name][0](self._site))
-        self._site.plant.turn(_TURN)
+            (name,) = site.chance.choices(names, weights)
+            site.plant.ledger.add("fault", name=name, share=self.share)
+            self._faults.append(FAULTS[name][0](site))
+        site.plant.spin(_TURN)
         self._look()
 
-    def _speak(self) -> None:
-        """Let the sensors of the valve of now say what is due."""
-        if time.monotonic() < self._next_word or not self._site.plant.is_ready(_OF_NOW):
-            return
-        self._next_word = time.monotonic() + PERIOD
-        self._site.plant.say(_OF_NOW, self._site.nonsense)
+    def _go_on(self) -> None:
+        """Let the sensors of the valve of now say what is due, and each fault take its step."""
+        plant = self._site.plant
+        if time.monotonic() >= self._next_word and plant.is_ready(_OF_NOW):
+            self._next_word = time.monotonic() + PERIOD
+            plant.say(_OF_NOW, self._site.nonsense)
+        self._faults = [one for one in self._faults if next(one, self) is None]
 
     def _feed(self, valve: str) -> None:
         site, plant = self._site, self._site.plant
@@ -155,26 +138,24 @@ class _Month:
             plant.ask(valve, site.chance.choice(_OTHERS))
 
     def _look(self) -> None:
-        for process in self._site.plant.processes:
+        plant = self._site.plant
+        for process in plant.processes:
             code = process.life.process.exit_code()
             if code is not None and not process.is_held:
-                plant = self._site.plant
                 plant.ledger.add("died", name=process.name, code=code)
-                plant.give_up_calls(process, "died")
-                plant.note_life(process, "died")
-                process.begin_again()
+                plant.note_end(process, "died")
+                process.begin()
 
     def finish(self) -> None:
         """Let each fault end, and let everything that was sent be accounted for."""
         plant = self._site.plant
         deadline = time.monotonic() + _START_LIMIT
         while self._faults and time.monotonic() < deadline:
-            self._speak()
-            self._faults = [one for one in self._faults if next(one, self) is None]
-            plant.turn(_TURN)
+            self._go_on()
+            plant.spin(_TURN)
         for process in plant.processes:
             for _ in settled(process):
-                plant.turn(_TURN)
+                plant.spin(_TURN)
         plant.wait(lambda: not any(map(_is_waiting, plant.processes)), _START_LIMIT)
 
 
@@ -190,64 +171,56 @@ def _stored(path: Path, valves: Sequence[str]) -> Mapping[str, int]:
     return {valve: len(file.entries([f"{valve}/identifier"], 0, 2**63 - 1)) for valve in valves}
 
 
-def _run(
-    folder: Path, seconds: float, chance: random.Random, ledger: Ledger
-) -> tuple[Mapping[str, int], Kept | None]:
-    """Run the plant for some seconds; return what is in its history then, and on its server."""
-    disk = folder / "disk"
+def _live(options: argparse.Namespace, seconds: float, ledger: Ledger) -> Iterator[Row]:
+    """Run the plant for some seconds; account for what has happened."""
+    disk = options.folder / "disk"
+    history = disk / "history.sqlite"
     with small_disk(disk) as is_small, own_database() as database:
         if not is_small:
             ledger.add("left out", what="full disk: no rights to mount one")
         if database is None:
             ledger.add("left out", what=f"database: {why_no_server()}")
-        plant = Plant(ledger, _processes(folder, disk, database.url if database else ""))
-        try:
-            feeds = {valve: Feed(growth) for valve, growth in _GROWTH.items()}
-            site = Site(plant, feeds, _OF_NOW, disk if is_small else None, database, chance)
-            if not plant.wait(lambda: all(map(plant.is_ready, plant.valves)), _START_LIMIT):
-                raise RuntimeError(f"the plant is not ready: see the logs in {folder}")
-            _live(_Month(site, seconds), plant)
-            history = disk / "history.sqlite"
-            stored = _stored(history, plant.valves)
-            return stored, None if database is None else database.compared_with(history)
-        finally:
-            for process in plant.processes:
-                if process.life.process.exit_code() is None:
+        processes = _processes(options.folder, disk, database.url if database else "")
+        with Plant(ledger, processes) as plant:
+            try:
+                feeds = {valve: Feed(growth) for valve, growth in _GROWTH.items()}
+                chance = random.Random(options.seed)
+                site = Site(plant, feeds, _OF_NOW, disk if is_small else None, database, chance)
+                if not plant.wait(lambda: all(map(plant.is_ready, plant.valves)), _START_LIMIT):
+                    raise RuntimeError(f"the plant is not ready: see the logs in {options.folder}")
+                _pass(_Month(site, seconds), plant)
+            finally:
+                for process in processes:
                     process.life.process.kill()
-            plant.close()
+        yield from rows(ledger.events(), _stored(history, plant.valves))
+        if database is not None:
+            yield from database_rows(database.compared_with(history))
 
 
-def _live(month: _Month, plant: Plant) -> None:
+def _pass(month: _Month, plant: Plant) -> None:
     """Let the month go by; then end all processes, and note what they held."""
     lasting = plant.processes[-1]
+
+    def note_memory(share: float) -> None:
+        memory = lasting.life.process.usage().memory
+        plant.ledger.add("memory", name=lasting.name, share=share, megabytes=memory)
+
     looks = iter(_LOOKS)
     look = next(looks)
     while month.share < 1.0:
         month.turn()
         if month.share > look:
-            memory = lasting.life.process.usage().memory
-            plant.ledger.add("memory", name=lasting.name, share=look, megabytes=memory)
+            note_memory(look)
             look = next(looks, math.inf)
     month.finish()
-    memory = lasting.life.process.usage().memory
-    plant.ledger.add("memory", name=lasting.name, share=1.0, megabytes=memory)
+    note_memory(1.0)
     for process in plant.processes:
         plant.end_life(process, signal.SIGINT)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the soak; return 1 if a goal is missed."""
-    parser = argparse.ArgumentParser(prog="soak", description=__doc__)
-    add_run_arguments(parser)
-    options = parser.parse_args(arguments)
-
-    def live(folder: Path, seconds: float, seed: int, ledger: Ledger) -> Iterator[Row]:
-        stored, kept = _run(folder, seconds, random.Random(seed), ledger)
-        yield from rows(list(ledger.events()), stored)
-        if kept is not None:
-            yield from database_rows(kept)
-
-    return endured("soak", f"a month in {options.minutes:g} minutes", options, live)
+    return endured("a month in {}", run_parser("soak", __doc__), arguments, _live)
 
 
 if __name__ == "__main__":

@@ -14,56 +14,45 @@ import random
 import signal
 import time
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
-from benchmark.soak.database import Database
-from benchmark.soak.disk import filled
-from benchmark.soak.feed import Feed
-from benchmark.soak.nonsense import Nonsense
+from benchmark.soak.feed import Feed, Nonsense
 from benchmark.soak.plant import Life, Plant, Process
-
-__all__ = ["FAULTS", "Site", "bad_samples", "settled"]
+from benchmark.soak.site import Database, filled
 
 _PATIENCE = 60.0
 """Time, s, in which what was sent must be accounted for."""
 _HOUR = 3600 * 10**9
 
 
+@dataclass
 class Site:
     """What faults act on.
 
-    Parameters
+    Attributes
     ----------
-    plant : Plant
-        The processes.
     feeds : mapping of str to Feed
         Feed of each valve that works through the month.
     of_now : str
         Valve whose sensors speak by the clock of now.
     disk : Path or None
         Folder of the history, if its disk is small.
-    database : Database or None
-        Where the history is sent to, if there is one.
-    chance : Random
-        Of all that is drawn.
+    nonsense : Nonsense or None
+        What the sensors of the valve of now say wrong.
+    silent : set of str
+        Valves whose sensors say nothing.
     """
 
-    def __init__(
-        self,
-        plant: Plant,
-        feeds: Mapping[str, Feed],
-        of_now: str,
-        disk: Path | None,
-        database: Database | None,
-        chance: random.Random,
-    ) -> None:
-        self.plant, self.feeds, self.chance = plant, feeds, chance
-        self.of_now, self.kinds = of_now, itertools.cycle(Nonsense)
-        self.nonsense: Nonsense | None = None
-        """What the sensors of the valve of now say wrong."""
-        self.disk, self.database = disk, database
-        self.silent: set[str] = set()
-        """Valves whose sensors say nothing."""
+    plant: Plant
+    feeds: Mapping[str, Feed]
+    of_now: str
+    disk: Path | None
+    database: Database | None
+    chance: random.Random
+    kinds: Iterator[Nonsense] = field(default_factory=lambda: itertools.cycle(Nonsense))
+    nonsense: Nonsense | None = None
+    silent: set[str] = field(default_factory=set)
 
     def mortal(self) -> Process:
         """Choose a process that may be ended: the last one lives through the month."""
@@ -95,7 +84,7 @@ def restart(site: Site) -> Iterator[None]:
         return
     yield from settled(process)
     site.plant.end_life(process, site.chance.choice((signal.SIGINT, signal.SIGTERM)))
-    process.begin_again()
+    process.begin()
     process.is_held = False
 
 
@@ -108,7 +97,7 @@ def kill(site: Site) -> Iterator[None]:
     site.plant.end_life(process, signal.SIGKILL)
     process.is_held = True
     yield from _for(site.chance.uniform(0.0, 5.0))
-    process.begin_again()
+    process.begin()
     process.is_held = False
 
 

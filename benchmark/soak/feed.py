@@ -7,16 +7,18 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The records of one valve, a piece at a time, with the faults of its sensors."""
+"""What the sensors of valves say: the records of one, a piece at a time, or nonsense."""
 
 import math
 from collections.abc import Iterator
 from dataclasses import replace
+from enum import Enum
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from sensor_msgs.msg import FluidPressure, JointState
 
 from valve_friction_ros.model import (
     BENCH_VALVE,
@@ -26,8 +28,7 @@ from valve_friction_ros.model import (
     SineWave,
     simulate,
 )
-
-__all__ = ["PIECE", "Feed", "Piece"]
+from valve_friction_ros.nodes.plumbing.messages import time_message
 
 PIECE = 50
 """Rows that are sent at once."""
@@ -36,6 +37,15 @@ _ROWS, _RATE = 500, 100.0
 """Rows of a record, and rows a second of the valve's time."""
 _STEPS = 20
 """Steps in which the friction grows over the month."""
+
+PERIOD = 0.05
+"""Time from one nonsensical sample to the next, s."""
+TOLD_WITHIN = 5.0
+"""Time, s, within which nonsense must be told."""
+
+_BAR, _MM = 1e5, 1e-3
+_SECOND = 10**9
+_FAR = 3 * 10**8 * _SECOND
 
 
 class Piece(NamedTuple):
@@ -61,13 +71,7 @@ def _record(growth: float) -> Recording:
 
 
 class Feed:
-    """Records of one valve.
-
-    Parameters
-    ----------
-    growth : float
-        Friction at the end of the month over that at its begin.
-    """
+    """Records of one valve, whose friction grows over the month by a factor."""
 
     def __init__(self, growth: float) -> None:
         self._growth = growth
@@ -88,3 +92,51 @@ class Feed:
         for begin in range(0, _ROWS, PIECE):
             piece = slice(begin, begin + PIECE)
             yield Piece(stamps[piece], pressure[piece], record.position[piece])
+
+
+def stamped(stamp: int, pressure: float, position: float) -> tuple[FluidPressure, JointState]:
+    """Return what both sensors say at a time, ns."""
+    drive = FluidPressure(fluid_pressure=pressure)
+    stem = JointState(name=["stem"], position=[position])
+    drive.header.stamp = stem.header.stamp = time_message(stamp)
+    return drive, stem
+
+
+class Nonsense(Enum):
+    """What is wrong, with words that the node must find for it."""
+
+    WRONG_JOINT = "no position of the joint 'stem'"
+    PRESSURE_NAN = "actuator_pressure: 100 % of its samples are rejected"
+    POSITION_NAN = "stem_state: 100 % of its samples are rejected"
+    PRESSURE_ABOVE = "9e+05 Pa is outside the sensor's range"
+    PRESSURE_BELOW = "-1e+04 Pa is outside the sensor's range"
+    STEM_IN_MM = "stem_state: 100 % of its samples lie outside the travel"
+    STEM_ENDLESS = "1e+308 m is outside the range of any valve"
+    STEM_LATE = "later than actuator_pressure"
+    CLOCK_AHEAD = "3e+08 s ahead of the clock"
+    CLOCK_BEHIND = "3e+08 s behind the clock"
+    NO_STAMPS = "they repeat a stamp"
+
+
+def said(kind: Nonsense | None, now: int) -> tuple[FluidPressure, JointState]:
+    """Return what both sensors say at a time, ns; None: the truth."""
+    phase = 2 * math.pi * (now / _SECOND % 8.0) / 8.0
+    pressure = {
+        Nonsense.PRESSURE_NAN: math.nan,
+        Nonsense.PRESSURE_ABOVE: 9 * _BAR,
+        Nonsense.PRESSURE_BELOW: -0.1 * _BAR,
+    }.get(kind, (1.2 + 0.3 * math.sin(phase)) * _BAR)
+    truth = (6.0 + 2.0 * math.sin(phase)) * _MM
+    position = {
+        Nonsense.POSITION_NAN: math.nan,
+        Nonsense.STEM_IN_MM: truth / _MM,
+        Nonsense.STEM_ENDLESS: 1e308,
+    }.get(kind, truth)
+    off = {Nonsense.CLOCK_AHEAD: _FAR, Nonsense.CLOCK_BEHIND: -_FAR, Nonsense.NO_STAMPS: -now}
+    stamp = now + off.get(kind, 0)
+    drive, stem = stamped(stamp, pressure, position)
+    if kind is Nonsense.STEM_LATE:
+        stem.header.stamp = time_message(stamp + 5 * _SECOND)
+    if kind is Nonsense.WRONG_JOINT:
+        stem.name = ["arm"]
+    return drive, stem

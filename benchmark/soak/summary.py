@@ -10,17 +10,14 @@
 """The ledger as rows with their goals."""
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Iterator, Mapping
 
-from benchmark.churn.processes import CODES
-from benchmark.soak.database import Kept
-from benchmark.soak.nonsense import TOLD_WITHIN
-from benchmark.speed.rows import Row
+from benchmark.harness.processes import CODES
+from benchmark.harness.rows import Row, none, some
+from benchmark.harness.run import Events, by_kind
+from benchmark.soak.feed import TOLD_WITHIN
+from benchmark.soak.site import Kept
 
-__all__ = ["database_rows", "rows"]
-
-_Events = Sequence[Mapping[str, Any]]
 _KILLED = "SIGKILL"
 _BUSY = "already running"
 """Words of a refusal that looks at no record, so that nothing is stored."""
@@ -28,54 +25,48 @@ _MIDDLE, _GROWTH = 0.5, 1.05
 """Memory at the end over that in the middle, of the process that lives through the month."""
 
 
-def _none(item: str, value: int) -> Row:
-    return Row(item, value, "", goal="none", met=value == 0)
-
-
-def _samples(lives: _Events) -> Iterator[Row]:
+def _samples(lives: Events) -> Iterator[Row]:
     sent, taken, rejected = (
         sum(one[name] for one in lives) for name in ("sent", "taken", "rejected")
     )
-    yield Row("samples sent", sent, "", goal="some", met=sent > 0)
-    yield Row("samples taken", taken, "")
-    yield Row("samples rejected with a cause", rejected, "")
+    yield some("samples sent", sent)
+    yield Row("samples taken", taken)
+    yield Row("samples rejected with a cause", rejected)
     open_ = [(one["end"], one["sent"] - one["taken"] - one["rejected"]) for one in lives]
     killed = sum(count for end, count in open_ if end == _KILLED)
-    yield Row("sent in the last second before a kill, or never told", killed, "")
-    yield _none("samples unexplained", sum(abs(count) for end, count in open_ if end != _KILLED))
+    yield Row("sent in the last second before a kill, or never told", killed)
+    yield none("samples unexplained", sum(abs(count) for end, count in open_ if end != _KILLED))
 
 
-def _identifications(calls: _Events, lives: _Events, stored: Mapping[str, int]) -> Iterator[Row]:
+def _identifications(calls: Events, lives: Events, stored: Mapping[str, int]) -> Iterator[Row]:
     everything = [one for one in calls if one["service"] == "identify"]
     asked = [one for one in everything if _BUSY not in (one.get("message") or "")]
     answered = [one for one in asked if one["seconds"] is not None]
     cut = [one for one in asked if one.get("ended")]
     yield Row("identifications asked", len(everything), "", goal="some", met=bool(asked))
-    yield Row("refused, as another one ran", len(everything) - len(asked), "")
-    yield Row("answered with a result", sum(bool(one["success"]) for one in answered), "")
-    yield Row("answered with a refusal", sum(not one["success"] for one in answered), "")
-    yield Row("under way when the process ended", len(cut), "")
-    yield _none("never answered", len(asked) - len(answered) - len(cut))
+    yield Row("refused, as another one ran", len(everything) - len(asked))
+    yield Row("answered with a result", sum(bool(one["success"]) for one in answered))
+    yield Row("answered with a refusal", sum(not one["success"] for one in answered))
+    yield Row("under way when the process ended", len(cut))
+    yield none("never answered", len(asked) - len(answered) - len(cut))
     kept = sum(stored.values())
-    yield Row("stored in the history", kept, "")
+    yield Row("stored in the history", kept)
     ended = sum(one["unsaved"] for one in lives if one["end"] == _KILLED)
-    yield Row("waiting for a full disk at a kill", ended, "")
-    waiting = Counter(
-        {valve: sum(one["unsaved"] for one in lives if one["valve"] == valve) for valve in stored}
-    )
+    yield Row("waiting for a full disk at a kill", ended)
     lost = extra = 0
     for valve, count in stored.items():
+        waiting = sum(one["unsaved"] for one in lives if one["valve"] == valve)
         mine = sum(one["valve"] == valve for one in answered)
         unanswered = sum(one["valve"] == valve for one in asked) - mine
-        lost += max(mine - waiting[valve] - count, 0)
+        lost += max(mine - waiting - count, 0)
         extra += max(count - mine - unanswered, 0)
-    yield _none("answered, and not in the history", lost)
-    yield _none("in the history, and never asked", extra)
+    yield none("answered, and not in the history", lost)
+    yield none("in the history, and never asked", extra)
     if answered:
         yield Row("longest answer", max(one["seconds"] for one in answered), "s")
 
 
-def _memory(looks: _Events) -> Iterator[Row]:
+def _memory(looks: Events) -> Iterator[Row]:
     """Compare the end with the middle, when each part of the package has been used once."""
     by_share = {one["share"]: one["megabytes"] for one in looks}
     for share, size in by_share.items():
@@ -87,66 +78,51 @@ def _memory(looks: _Events) -> Iterator[Row]:
             yield Row(item, size, "MB")
 
 
-def _nonsense(begun: _Events, ended: _Events) -> Iterator[Row]:
+def _nonsense(begun: Events, ended: Events) -> Iterator[Row]:
     """Account for the nonsense of sensors: each is told, and over, within a time."""
     yield Row("kinds of nonsense that sensors said", len({one["name"] for one in begun}), "of 11")
-    for item, some in (("told", begun), ("over", ended)):
-        late = [one for one in some if not (one["told"] and one["seconds"] <= TOLD_WITHIN)]
-        yield _none(f"nonsense that was not {item} within {TOLD_WITHIN:g} s", len(late))
-        if some:
-            longest = max(one["seconds"] for one in some)
+    for item, events in (("told", begun), ("over", ended)):
+        late = [one for one in events if not (one["told"] and one["seconds"] <= TOLD_WITHIN)]
+        yield none(f"nonsense that was not {item} within {TOLD_WITHIN:g} s", len(late))
+        if events:
+            longest = max(one["seconds"] for one in events)
             yield Row(f"longest until nonsense was {item}", longest, "s")
 
 
-def rows(events: _Events, stored: Mapping[str, int]) -> Iterator[Row]:
-    """Account for all that happened.
-
-    Parameters
-    ----------
-    events : sequence of mapping
-        The ledger.
-    stored : mapping of str to int
-        Identifications in the history at the end, by valve.
-
-    Yields
-    ------
-    Row
-        An item of the account.
-    """
-
-    def of(kind: str) -> _Events:
-        return [one for one in events if one["kind"] == kind]
-
-    faults = Counter(one["name"] for one in of("fault"))
+def rows(events: Events, stored: Mapping[str, int]) -> Iterator[Row]:
+    """Account for all that happened; `stored` are the identifications in the history, by valve."""
+    of = by_kind(events)
+    faults = Counter(one["name"] for one in of["fault"])
     for name, count in sorted(faults.items()):
-        yield Row(f"fault: {name}", count, "")
-    lives = of("life")
+        yield Row(f"fault: {name}", count)
+    lives = of["life"]
     yield from _samples(lives)
-    yield from _identifications(of("call"), lives, stored)
-    others = [one for one in of("call") if one["service"] != "identify"]
-    yield Row("other calls", len(others), "")
+    yield from _identifications(of["call"], lives, stored)
+    others = [one for one in of["call"] if one["service"] != "identify"]
+    yield Row("other calls", len(others))
     never = sum(one["seconds"] is None and not one.get("ended") for one in others)
-    yield _none("other calls never answered", never)
-    yield _none("silent sensors that nobody told", sum(not one["told"] for one in of("silence")))
-    yield _none("full disks that nobody told", sum(not one["told"] for one in of("full disk")))
-    yield _none(
-        "databases away that nobody told", sum(not one["told"] for one in of("database away"))
-    )
-    yield from _nonsense(of("nonsense"), of("nonsense over"))
-    for end in of("ending"):
+    yield none("other calls never answered", never)
+    for kind, item in (
+        ("silence", "silent sensors"),
+        ("full disk", "full disks"),
+        ("database away", "databases away"),
+    ):
+        yield none(f"{item} that nobody told", sum(not one["told"] for one in of[kind]))
+    yield from _nonsense(of["nonsense"], of["nonsense over"])
+    for end in of["ending"]:
         if end["code"] not in CODES:
             item, code = f"{end['name']} ended with code", end["code"] or -1
             yield Row(item, code, "", goal="that of its signal", met=False)
-    yield _none("processes that ended by themselves", len(of("died")))
-    yield from _memory(of("memory"))
+    yield none("processes that ended by themselves", len(of["died"]))
+    yield from _memory(of["memory"])
 
 
 def database_rows(kept: Kept) -> Iterator[Row]:
     """Yield what the file and the server of the history hold at the end."""
-    yield Row("identifications in the file", kept.in_file, "")
+    yield Row("identifications in the file", kept.in_file)
     is_same = kept.on_server == kept.in_file
     yield Row("identifications on the server", kept.on_server, "", goal="as many", met=is_same)
-    yield Row("rows that wait for the next start", kept.waiting, "")
+    yield Row("rows that wait for the next start", kept.waiting)
     # One that was sent may wait still, until the node has heard that it arrived.
     lost = max(kept.lacking - kept.waiting, 0)
-    yield _none("rows that the server lacks and that do not wait", lost)
+    yield none("rows that the server lacks and that do not wait", lost)

@@ -11,18 +11,19 @@
 
 import argparse
 import importlib
+import os
 import pkgutil
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from rich.console import Console
-
+from benchmark.harness.rows import Row, judged, logged, opened_console, rows_table, write_json
+from benchmark.harness.run import quiet_domain
 from benchmark.speed import parts
-from benchmark.speed.rows import Row, Settings
-from benchmark.speed.table import machine_shape, rows_table, write_json
+from benchmark.speed.measuring import Settings
+from benchmark.speed.observer import PROFILE
 
-__all__ = ["main"]
+_DEMO = Path(__file__).resolve().parents[2] / "valve_friction_ros" / "commands" / "demo"
 
 
 def _part_names() -> list[str]:
@@ -51,25 +52,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     if not options.output.parent.is_dir():
         parser.error(f"{options.output}: there is no folder {options.output.parent}")
-    console = Console()
-    console.print(", ".join(f"{name} {value}" for name, value in machine_shape().items()))
+    console = opened_console()
+    os.environ[PROFILE] = str(_DEMO / "fast_discovery.xml")
     measured: dict[str, list[Row]] = {}
-    for name in options.parts:
-        part = importlib.import_module(f"{parts.__name__}.{name}")
-        title = part.__doc__.strip().splitlines()[0].rstrip(".")
-        rows = measured[name] = []
-        with console.status(title) as status:
-            for row in part.measure(Settings(options.repeats, options.seconds, status.update)):
-                rows.append(row)
-                console.log(f"{row.item}: {row.ours:.3g} {row.unit}")
-        console.print(rows_table(title, rows))
-        write_json(measured, options.output)
-    goals = [row for rows in measured.values() for row in rows if row.met is not None]
-    missed = [row for row in goals if not row.met]
-    for row in missed:
-        console.print(f"[red]missed[/] {row.item}: {row.goal}", soft_wrap=True)
-    console.print(f"{len(goals) - len(missed)} of {len(goals)} goals are met")
-    return 1 if missed else 0
+    with quiet_domain():
+        for name in options.parts:
+            part = importlib.import_module(f"{parts.__name__}.{name}")
+            title = part.__doc__.strip().splitlines()[0].rstrip(".")
+            rows = measured[name] = []
+            with console.status(title) as status:
+                settings = Settings(options.repeats, options.seconds, status.update)
+                logged(part.measure(settings), rows, console)
+            console.print(rows_table(title, rows))
+            write_json(measured, options.output)
+    return judged([row for rows in measured.values() for row in rows], console)
 
 
 if __name__ == "__main__":

@@ -11,16 +11,15 @@
 
 import signal
 import sys
-import time
 
 import numpy as np
 import pytest
 
-from benchmark.churn.audit import missing_samples
-from benchmark.churn.ledger import Ledger
-from benchmark.churn.places import RATE, Node
-from benchmark.churn.processes import NodeProcess
+from benchmark.churn.places import RATE
 from benchmark.churn.summary import hung_services, rows
+from benchmark.churn.visitor import missing_samples
+from benchmark.harness.processes import Process
+from benchmark.harness.run import Ledger
 
 GOOD = (
     {"kind": "run", "seconds": 60.0},
@@ -115,13 +114,10 @@ def test_hung_process_leaves_its_stacks(tmp_path, monkeypatch):
         "sleeping_for_ever()\n"
     )
     hangs.chmod(0o755)
-    monkeypatch.setattr("benchmark.churn.processes._EXECUTABLES", tmp_path)
-    monkeypatch.setattr("benchmark.churn.processes.PATIENCE", 0.2)
-    monkeypatch.setattr("benchmark.churn.processes.shutil.which", lambda _: None)
-    process = NodeProcess(Node("hangs", ()), tmp_path / "log")
-    deadline = time.monotonic() + 30
-    while "ready" not in process.log.read_text() and time.monotonic() < deadline:
-        time.sleep(0.02)
+    monkeypatch.setattr("benchmark.harness.processes.PATIENCE", 0.2)
+    monkeypatch.setattr("benchmark.harness.processes.shutil.which", lambda _: None)
+    process = Process([str(hangs)], tmp_path / "log")
+    process.wait_for("ready")
     assert process.end(signal.SIGTERM) is None
-    assert "sleeping_for_ever" in process.log.read_text()
+    assert "sleeping_for_ever" in process.said()
     assert process.exit_code() == -signal.SIGABRT

@@ -18,8 +18,7 @@ import pytest
 from rich.console import Console
 
 from benchmark.service.course import Task
-from benchmark.service.drawn import valve_of
-from benchmark.service.plants import PLANTS, Duty
+from benchmark.service.plants import PLANTS, Duty, valve_of
 from benchmark.service.report import bounds_met, tables
 from benchmark.service.service import stretches
 from benchmark.service.trial import Number, Told, tried

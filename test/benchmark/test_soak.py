@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 from histories import SECOND, START, success
 
-from benchmark.soak.database import Database, Kept
 from benchmark.soak.feed import PIECE, Feed
+from benchmark.soak.site import Database, Kept
 from benchmark.soak.summary import database_rows, rows
 from valve_friction_ros.history import HistoryFile, copied
 from valve_friction_ros.history.place import HistoryServer

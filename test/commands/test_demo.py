@@ -7,11 +7,14 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The sub-command `demo`: its verdict, its options, and its whole story at a quicker pace."""
+"""The sub-command `demo`, its verdict and its whole story, and the client of its bench."""
 
 import argparse
+import contextlib
 import io
+import json
 import math
+import os
 import re
 import signal
 import subprocess
@@ -21,11 +24,17 @@ from pathlib import Path
 
 import pytest
 from rich.console import Console
+from waiting import wait_until
 
 from valve_friction_ros.commands.arguments.declared import DECLARATIONS
 from valve_friction_ros.commands.demo import command as demo
 from valve_friction_ros.commands.demo import plant
-from valve_friction_ros.commands.demo.bench import BenchError
+from valve_friction_ros.commands.demo.bench import (
+    BenchError,
+    NodeProcess,
+    quick_discovery,
+    running_nodes,
+)
 from valve_friction_ros.commands.demo.command import TOLERANCES, Outcome, identified
 from valve_friction_ros.figures import Case
 from valve_friction_ros.health import Level
@@ -37,6 +46,7 @@ from valve_friction_ros.identification import (
     identify_bench,
 )
 from valve_friction_ros.model import BENCH_VALVE, HIGH_FRICTION, LOW_FRICTION
+from valve_friction_ros.nodes.plumbing.rclpy_private import PROFILES
 from valve_friction_ros.settings import KARNOPP
 
 PNG = b"\x89PNG\r\n\x1a\n"
@@ -344,10 +354,7 @@ def test_interrupted(ros_environment, tmp_path):
         cwd=tmp_path,
         env=ros_environment,
     )
-    deadline = time.monotonic() + 60
-    while len(children(process.pid)) < 3:
-        assert time.monotonic() < deadline
-        time.sleep(0.05)
+    wait_until(lambda: len(children(process.pid)) >= 3)
     time.sleep(1.0)
     nodes = children(process.pid)
     process.send_signal(signal.SIGINT)
@@ -395,3 +402,64 @@ def test_the_whole_story(ros_environment, tmp_path):
     assert ratio == pytest.approx(grown, rel=0.06)  # tight, it is slower, and may have fallen
     assert "outside the tolerance" not in words
     assert output.read_bytes().startswith(PNG)
+
+
+NAMES = ("ROS_AUTOMATIC_DISCOVERY_RANGE", PROFILES)
+
+
+def test_what_a_client_is_told(ros_environment):
+    """Two nodes and a client as processes: every failure has its reason, and all end well."""
+    done = subprocess.run(
+        [sys.executable, Path(__file__).with_name("bench_visit.py")],
+        capture_output=True,
+        text=True,
+        timeout=90,
+        check=False,
+        env=ros_environment,
+    )
+    assert done.returncode == 0, done.stderr
+    assert "Traceback" not in done.stderr
+    told = json.loads(done.stdout)
+    assert told["before"] == [0.0, None, ""]
+    assert told["identify"].startswith("identify: no ")
+    assert "actuator_pressure" in told["identify"]
+    assert told["clear"]
+    assert told["impossible"].startswith("simulator refused: ")
+    assert "static_friction" in told["impossible"]
+    assert told["possible"] is None
+    assert told["absent node"] == (
+        "no answer of /fv_7/nobody/set_parameters_atomically within 0.1 s"
+    )
+    assert told["absent service"] == (
+        "/fv_7/identifier/dance is not there: start the identifier of this valve"
+    )
+    assert "actuator_pressure" in told["message"]
+    assert told["estimate_valid"] == "false"
+    assert told["exit codes"] == [0, 0]
+
+
+class TestQuickDiscovery:
+    def test_stays_on_this_machine(self, monkeypatch):
+        for name in NAMES:
+            monkeypatch.delenv(name, raising=False)
+        found = quick_discovery()
+        assert set(found) == set(NAMES)
+        assert found["ROS_AUTOMATIC_DISCOVERY_RANGE"] == "LOCALHOST"
+        assert Path(found[PROFILES]).is_file()
+
+    @pytest.mark.parametrize("name", NAMES)
+    def test_what_the_user_has_set_stays(self, monkeypatch, name):
+        for other in NAMES:
+            monkeypatch.delenv(other, raising=False)
+        monkeypatch.setenv(name, "of the user")
+        assert set(quick_discovery()) == set(NAMES) - {name}
+        assert os.environ[name] == "of the user"
+
+
+def test_processes_end_with_the_context_even_after_an_error():
+    """An unknown node ends by itself at once, or is ended."""
+    node = NodeProcess("no_such_node", {})
+    with contextlib.suppress(ZeroDivisionError), running_nodes([node, node], "fv_7") as processes:
+        1 / 0  # noqa: B018
+    assert len(processes) == 2
+    assert all(process.returncode is not None for process in processes)

@@ -15,10 +15,11 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
+from functools import partial
 from pathlib import Path
 
 import pytest
+import waiting
 from dask_workers import identify, local_cluster
 from documentation import PROJECT
 from kept_rows import kept
@@ -59,11 +60,7 @@ def rows_of(path):
         return {row["recording"]: row for row in csv.DictReader(stream)}
 
 
-def wait_until(condition):
-    deadline = time.monotonic() + PATIENCE
-    while not condition():
-        assert time.monotonic() < deadline
-        time.sleep(0.05)
+wait_until = partial(waiting.wait_until, patience=PATIENCE)
 
 
 def test_the_rows_and_reports_of_the_local_run(address, tmp_path, command, monkeypatch):

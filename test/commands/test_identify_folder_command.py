@@ -18,12 +18,13 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
 from collections import Counter
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
+import waiting
 from bags import messages_of, write_bag
 from kept_rows import kept
 
@@ -115,11 +116,7 @@ def done(path):
     return Counter((row["recording"], row["valve"]) for row in rows_of(path))
 
 
-def wait_until(condition):
-    deadline = time.monotonic() + PATIENCE
-    while not condition():
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
+wait_until = partial(waiting.wait_until, patience=PATIENCE)
 
 
 def children(process):

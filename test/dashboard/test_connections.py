@@ -21,6 +21,7 @@ from pathlib import Path
 
 import pytest
 from local_server import free_port
+from waiting import wait_until
 
 pytest.importorskip("nicegui", reason="NiceGUI is not installed")
 
@@ -94,11 +95,7 @@ def opened():
 
 
 def until(condition, what, patience=PATIENCE):
-    deadline = time.monotonic() + patience
-    while not (met := condition()):
-        assert time.monotonic() < deadline, f"not within {patience:g} s: {what}"
-        time.sleep(0.05)
-    return met
+    return wait_until(condition, lambda: what, patience, 0.05)
 
 
 @pytest.mark.parametrize("source", ["127.0.0.2", "127.0.0.1"])

@@ -7,16 +7,31 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""What can be a baseline, and what is refused."""
+"""What can be a baseline, and what is refused; moves in service that are one, and are diagnosed."""
 
 import dataclasses
 import math
+from dataclasses import replace
 
 import pytest
+from service import SECOND, START, VALVE, made_moves
 
-from valve_friction_ros.health import Baseline, BaselineLack, Lack, SlidingFriction
+from valve_friction_ros.evidence import evidence_of
+from valve_friction_ros.health import (
+    Baseline,
+    BaselineLack,
+    FrictionLimits,
+    Lack,
+    Level,
+    SlidingFriction,
+    StatusSignal,
+    baseline_by_evidence,
+    diagnosis_by_evidence,
+    reference_by_evidence,
+    why_not_compared,
+)
 from valve_friction_ros.health.baseline import GOOD_SHARE, LARGEST_SHARE
-from valve_friction_ros.identification import RefusalError
+from valve_friction_ros.identification import IdentificationSettings, RefusalError
 
 
 class TestBounds:
@@ -126,3 +141,166 @@ class TestOfAResult:
         for growth, share in ((1.5, GOOD_SHARE), (2.0, LARGEST_SHARE)):
             found = growth * math.exp(-math.sqrt(2) * share)
             assert found == pytest.approx(1.25, rel=5e-3)
+
+
+LIMITS = FrictionLimits()
+EXACT = IdentificationSettings(timing_uncertainty=0.005)
+
+
+def evidence(friction, hours=2.0, settings=EXACT):
+    return evidence_of(made_moves(hours, friction), VALVE, settings)
+
+
+def baseline(value=300.0):
+    return Baseline(sliding=SlidingFriction(value, 10.0, 1.25e-3))
+
+
+@pytest.mark.parametrize(
+    ("now", "level", "signal", "words"),
+    [
+        (300.0, Level.OK, StatusSignal.GOOD, "friction normal"),
+        (450.0, Level.WARN, StatusSignal.MAINTENANCE_REQUIRED, "friction has grown"),
+        (750.0, Level.ERROR, StatusSignal.FAILURE, "excess friction"),
+        (90.0, Level.ERROR, StatusSignal.OUT_OF_SPECIFICATION, "friction collapsed"),
+    ],
+)
+def test_limits_are_those_of_an_identification(now, level, signal, words):
+    found = diagnosis_by_evidence(evidence(lambda _: now), VALVE, baseline(), LIMITS)
+    assert (found.level, found.status_signal) == (level, signal)
+    assert found.message.startswith(words)
+    assert "moves in service since 2023-11-14" in found.message
+    assert found.ratio.value == pytest.approx(now / 300.0, rel=0.05)
+
+
+def test_an_alarm_says_when_friction_changed():
+    """And with which doubt: the date is an interval that holds the truth."""
+    grown = evidence(lambda hour: 450.0 if hour >= 3.0 else 300.0, hours=3.7)
+    assert grown.change.earliest <= START + 3 * 3600 * SECOND <= grown.change.latest
+    first = reference_by_evidence(evidence(lambda _: 300.0))
+    for healthy, reference in ((baseline(), None), (None, first)):
+        found = diagnosis_by_evidence(grown, VALVE, healthy, LIMITS, reference)
+        assert found.level is Level.WARN
+        assert "; it changed between 2023-11-15" in found.message
+    steady = diagnosis_by_evidence(evidence(lambda _: 300.0), VALVE, baseline(), LIMITS)
+    assert "it changed" not in steady.message
+
+
+class TestReference:
+    """Friction when the moves were first combined, where no baseline can be compared."""
+
+    FIRST = reference_by_evidence(evidence(lambda _: 300.0))
+
+    def found(self, now, healthy=None, reference=FIRST):
+        return diagnosis_by_evidence(now, VALVE, healthy, LIMITS, reference)
+
+    def test_the_alarm_stays_when_the_change_has_left_the_ledger(self):
+        now = evidence(lambda _: 450.0)
+        assert now.change is None
+        found = self.found(now)
+        assert (found.level, found.status_signal) == (Level.WARN, StatusSignal.MAINTENANCE_REQUIRED)
+        assert "times what it was until 2023-11-15" in found.message
+        assert "no baseline: call ~/set_baseline while it is healthy" in found.message
+        assert found.ratio.value == pytest.approx(1.5, rel=0.05)
+
+    def test_slow_growth_ends_in_an_error(self):
+        grown = evidence(lambda hour: 300.0 * (1 + hour / 13), hours=18.0)
+        assert self.found(grown).level is Level.ERROR
+
+    def test_a_second_change_does_not_hide_the_first(self):
+        def friction(hour):
+            return 300.0 if hour < 3 else 480.0 if hour < 6 else 450.0
+
+        assert self.found(evidence(friction, hours=9.0)).level is Level.WARN
+
+    def test_the_same_friction_is_normal_and_none_is_not_compared(self):
+        same = evidence(lambda _: 300.0)
+        assert self.found(same).level is Level.OK
+        assert self.found(same, reference=None) is None
+        assert self.found(evidence(lambda _: 300.0, hours=0.2)) is None
+
+    @pytest.mark.parametrize(
+        ("healthy", "words"),
+        [
+            (Baseline(600.0), "has no sliding friction"),
+            (Baseline(sliding=SlidingFriction(300.0, 10.0, 6e-3)), "belongs to 6 mm/s"),
+        ],
+    )
+    def test_it_stands_in_for_a_baseline_that_cannot_be_compared(self, healthy, words):
+        now = evidence(lambda _: 900.0)
+        found = self.found(now, healthy)
+        assert found.level is Level.ERROR
+        assert "the baseline cannot be compared: call ~/set_baseline" in found.message
+        assert words in str(why_not_compared(now, healthy))
+
+    def test_a_baseline_that_can_be_compared_counts(self):
+        now = evidence(lambda _: 450.0)
+        assert self.found(now, baseline(450.0)).level is Level.OK
+        assert why_not_compared(now, baseline()) is why_not_compared(now, None) is None
+
+    @pytest.mark.parametrize("reference", [None, FIRST], ids=["none", "of other speeds"])
+    def test_a_change_is_an_alarm_where_nothing_can_be_compared(self, reference):
+        """A stem that sticks more moves faster."""
+        moves = made_moves(4.0, lambda hour: 450.0 if hour >= 2 else 300.0)
+        for one in moves[600:]:
+            object.__setattr__(one, "speed", 2.5 * one.speed)
+        found = self.found(evidence_of(moves, VALVE, EXACT), reference=reference)
+        assert found.level is Level.WARN
+        assert found.message.startswith("friction has grown: sliding friction at 3.")
+        assert "what it was before it changed, between 2023-11-1" in found.message
+        assert found.ratio.low <= 1.5 <= found.ratio.high
+        small = evidence(lambda hour: 350.0 if hour >= 2 else 300.0, hours=4.0)
+        assert small.change is not None
+        assert self.found(small, reference=None) is None
+
+    def test_one_that_is_first_known_after_a_change_is_that_of_before(self):
+        grown = evidence(lambda hour: 450.0 if hour >= 2 else 300.0, hours=4.0)
+        late = reference_by_evidence(grown)
+        assert abs(late.sliding.value - 300.0) < late.sliding.half_width < 30.0
+        assert late.time == grown.change.earliest
+        assert self.found(evidence(lambda _: 450.0), reference=late).level is Level.WARN
+
+    def test_one_that_is_first_known_after_two_changes_is_that_of_before_both(self):
+        def friction(hour):
+            return 300.0 if hour < 3 else 390.0 if hour < 9 else 510.0
+
+        grown = evidence(friction, hours=9.8)
+        first, second = grown.changes
+        assert grown.change is second
+        late = reference_by_evidence(grown)
+        assert abs(late.sliding.value - 300.0) < late.sliding.half_width < 60.0
+        assert late.time == first.earliest
+
+    def test_it_is_known_as_well_as_a_baseline(self):
+        assert reference_by_evidence(evidence(lambda _: 300.0, hours=0.2)) is None
+        assert self.FIRST.sliding.value == pytest.approx(300.0, rel=0.02)
+
+
+def test_a_negative_friction_points_to_the_signals():
+    found = diagnosis_by_evidence(evidence(lambda _: -300.0), VALVE, baseline(), LIMITS)
+    assert found.level is Level.WARN
+    assert "check the direction of both signals" in found.message
+
+
+class TestBaseline:
+    def test_of_moves(self):
+        one = baseline_by_evidence(evidence(lambda _: 300.0))
+        assert one.coulomb_friction is None
+        assert one.sliding.value == pytest.approx(300.0, rel=0.02)
+
+    def test_too_few(self):
+        with pytest.raises(RefusalError, match=r"no baseline yet: .* moves up and"):
+            baseline_by_evidence(evidence(lambda _: 300.0, hours=0.2))
+
+    def test_too_wide(self):
+        wide = evidence(lambda _: 50.0, settings=IdentificationSettings(timing_uncertainty=0.1))
+        with pytest.raises(RefusalError, match=r"known to .* a baseline needs"):
+            baseline_by_evidence(wide)
+
+    @pytest.mark.parametrize(("share", "serves"), [(0.13, True), (0.131, False)])
+    def test_moves_go_on_until_they_are_a_good_one(self, share, serves):
+        """Of a record 33 % would serve; more moves come by themselves."""
+        found = evidence(lambda _: 300.0)
+        one = found.parameters["sliding_friction"]
+        one = replace(one, half_width=share * one.value, uncalibrated=None)
+        found = replace(found, parameters={**found.parameters, "sliding_friction": one})
+        assert (reference_by_evidence(found) is not None) is serves

@@ -7,20 +7,48 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Friction compared with its baseline: which friction, at which speed, and the ratio's interval."""
+"""Friction compared with its baseline: which one, the ratio's interval, and what qualifies it."""
 
 import dataclasses
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from records import quick_record
 
-from valve_friction_ros.health import Baseline, Comparison, SlidingFriction, carried, compared
-from valve_friction_ros.health.measured import Measured
+from valve_friction_ros import compare
+from valve_friction_ros.health import (
+    Baseline,
+    Comparison,
+    Diagnosis,
+    Finding,
+    FrictionMonitor,
+    Level,
+    Measured,
+    MonitorSettings,
+    Ratio,
+    SlidingFriction,
+    StatusSignal,
+    Survey,
+    SurveyLimits,
+    carried,
+    compared,
+    diagnose,
+    diagnose_valve,
+    leading_ratio,
+    qualified,
+    surveyed,
+)
+from valve_friction_ros.health.diagnosis import survey_of
+from valve_friction_ros.health.survey import PACKING_LIMITS
 from valve_friction_ros.health.valve_numbers import SHARED
-from valve_friction_ros.identification import SPEED_EXPONENT, Parameter, Verdict
+from valve_friction_ros.identification import SPEED_EXPONENT, Parameter, Verdict, identify
+from valve_friction_ros.model import BENCH_VALVE, HIGH_FRICTION, LOW_FRICTION, Valve
+from valve_friction_ros.settings import PACKINGS
+from valve_friction_ros.wording import Code, quoted
 
 FRICTIONS = st.floats(1.0, 1e4)
 SHARES = st.floats(0.0, 0.99)
@@ -334,3 +362,162 @@ class TestExponent:
             found = carried(now, speed, to, {SPEED_EXPONENT: Measured(slope, 0.0)})
             inside.append(abs(found.value - law(apart * speed)) <= found.half_width)
         assert 0.9 < np.mean(inside) < 1.0
+
+
+FACTOR = Measured.between(2.2, 2.15, 2.25)
+VALVE = Valve(diaphragm_area=0.04, pressure_reference=1e5, travel=0.03)
+GROWN = Diagnosis(
+    Level.ERROR,
+    StatusSignal.FAILURE,
+    quoted("excess friction: so much"),
+    Ratio.between(2.2, 2.1, 2.3),
+)
+WORDS = (
+    "friction and spring constant have changed by one factor, which points to the scale of the "
+    "pressure sensor and the diaphragm area: check both before any work on the packing; "
+)
+
+
+def test_the_level_stays_and_the_signal_is_to_check():
+    told = qualified(GROWN, FACTOR, VALVE)
+    assert (told.level, told.status_signal) == (Level.ERROR, StatusSignal.CHECK_FUNCTION)
+    assert told.message == WORDS + "excess friction: so much"
+    assert qualified(told, FACTOR, VALVE) == told
+
+
+def test_a_force_has_no_diaphragm():
+    told = qualified(GROWN, FACTOR, Valve(None, travel=0.03))
+    assert "points to the scale of the drive force sensor: check both" in told.message
+
+
+@pytest.mark.parametrize(
+    ("diagnosis", "factor"),
+    [
+        (GROWN, None),
+        (GROWN, Measured.between(1.5, 1.45, 1.55)),
+        (replace(GROWN, level=Level.OK), FACTOR),
+        (replace(GROWN, ratio=None), FACTOR),
+    ],
+)
+def test_what_the_factor_does_not_explain_stays(diagnosis, factor):
+    """No factor; a friction that has grown by more; nothing found; nothing compared."""
+    assert qualified(diagnosis, factor, VALVE) == diagnosis
+
+
+@pytest.fixture(scope="module")
+def healthy():
+    return identify(quick_record(), BENCH_VALVE)
+
+
+class TestWholeRecords:
+    """Half the area stands for a pressure sensor that reads twice too much."""
+
+    @pytest.fixture(scope="class")
+    def scaled(self):
+        twice = replace(BENCH_VALVE, diaphragm_area=2 * BENCH_VALVE.diaphragm_area)
+        return identify(quick_record(), twice)
+
+    def test_by_a_result(self, healthy, scaled):
+        found = diagnose_valve(scaled, Baseline.of(healthy))
+        assert found.friction.message.startswith(WORDS)
+        assert "one common factor" in found.findings[0].message
+        assert compare(scaled, healthy) == found.friction
+
+    def test_by_the_monitor(self, healthy, scaled):
+        monitor = FrictionMonitor(MonitorSettings(scaled.valve))
+        monitor.baseline = Baseline.of(healthy)
+        monitor.accept(scaled, 1)
+        assert monitor.diagnosis().message.startswith(WORDS)
+        assert monitor.diagnosis().level > Level.OK
+
+    def test_friction_that_has_grown_by_itself(self, healthy):
+        tight = 2.5 * LOW_FRICTION.coulomb_friction
+        packing = replace(LOW_FRICTION, coulomb_friction=tight, static_friction=tight)
+        found = diagnose_valve(identify(quick_record(packing), BENCH_VALVE), Baseline.of(healthy))
+        assert found.friction.status_signal is StatusSignal.FAILURE
+        assert found.friction.message.startswith("excess friction")
+
+
+MOVES, IDENTIFIED = 2.4, 1.1
+
+
+def by_moves(level, leads):
+    return Finding(
+        level, StatusSignal.FAILURE, quoted("by moves"), leads=leads, friction_ratio=MOVES
+    )
+
+
+SPRING = Finding(Level.WARN, StatusSignal.MAINTENANCE_REQUIRED, quoted("the spring"))
+
+
+@pytest.mark.parametrize(
+    ("diagnosed", "findings", "level", "ratio"),
+    [
+        (Level.OK, [by_moves(Level.ERROR, True)], Level.ERROR, MOVES),
+        (Level.ERROR, [by_moves(Level.ERROR, True)], Level.ERROR, MOVES),
+        (Level.ERROR, [by_moves(Level.ERROR, False)], Level.ERROR, IDENTIFIED),
+        (Level.OK, [by_moves(Level.ERROR, False)], Level.ERROR, MOVES),
+        (Level.WARN, [SPRING], Level.WARN, IDENTIFIED),
+        (Level.OK, [SPRING], Level.WARN, math.nan),
+        (Level.OK, [], Level.OK, IDENTIFIED),
+        (Level.OK, [by_moves(Level.WARN, True)], Level.ERROR, math.nan),
+    ],
+)
+def test_the_ratio_of_a_level(diagnosed, findings, level, ratio):
+    diagnosis = Diagnosis(
+        diagnosed, StatusSignal.GOOD, quoted(""), Ratio.between(IDENTIFIED, 1.0, 1.2)
+    )
+    assert leading_ratio(diagnosis, findings, level) == pytest.approx(ratio, nan_ok=True)
+    without = Diagnosis(diagnosed, StatusSignal.GOOD, quoted(""), None)
+    expected = math.nan if ratio == IDENTIFIED else ratio
+    if not any(one.level == level and one.friction_ratio == MOVES for one in findings):
+        assert leading_ratio(without, findings, level) == pytest.approx(expected, nan_ok=True)
+
+
+NAN = float("nan")
+
+
+@pytest.mark.parametrize(
+    ("band", "half_width", "expected"),
+    [
+        (0.05, 0.01, Survey.GOOD),
+        (0.05, 0.06, Survey.WATCH),
+        (0.15, 0.01, Survey.WATCH),
+        (0.21, 0.005, Survey.BAD),
+        (0.21, 0.05, Survey.WATCH),
+        (0.15, 0.10, Survey.UNKNOWN),
+        (NAN, NAN, Survey.UNKNOWN),
+    ],
+)
+def test_the_interval_decides(band, half_width, expected):
+    assert surveyed(band, half_width) is expected
+
+
+def test_a_packing_has_limits_which_may_be_stated():
+    assert tuple(PACKING_LIMITS) == PACKINGS
+    assert SurveyLimits.of_packing() == SurveyLimits() == SurveyLimits(0.10, 0.20)
+    assert SurveyLimits.of_packing("graphite") == SurveyLimits(0.15, 0.30)
+    assert SurveyLimits.of_packing("graphite", bad=0.5) == SurveyLimits(0.15, 0.5)
+    with pytest.raises(ValueError, match="packing must be ptfe or graphite, got 'felt'"):
+        SurveyLimits.of_packing("felt")
+    with pytest.raises(ValueError, match=r"survey_bad, got survey_watch 0\.25, survey_bad 0\.2"):
+        SurveyLimits.of_packing(watch=0.25)
+
+
+def test_limits_are_in_order():
+    with pytest.raises(ValueError, match="0 < survey_watch < survey_bad"):
+        SurveyLimits(0.2, 0.1)
+
+
+@pytest.mark.parametrize(
+    ("packing", "expected", "words"),
+    [((), Survey.GOOD, ": good, by"), ((HIGH_FRICTION,), Survey.BAD, ": bad, by")],
+)
+def test_the_packings_of_the_paper(packing, expected, words):
+    """(F_c + F_s)/(k·travel): 2·152.7/5858 = 5.2 % of the one, 2·606/5858 = 20.7 % of the other."""
+    result = identify(quick_record(*packing), BENCH_VALVE)
+    assert survey_of(result, BENCH_VALVE) is expected
+    found = diagnose(result, BENCH_VALVE)
+    assert (found.survey, found.statement.code) == (expected, Code.NO_BASELINE)
+    assert words in found.message
+    assert found.to_dict()["survey"] == expected.value

@@ -13,13 +13,13 @@ import datetime
 import ipaddress
 import os
 import re
-import time
 from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 from full_history import all_of, fill
 from histories import START, VALVE, success
+from waiting import wait_until
 
 from valve_friction_ros.history import (
     History,
@@ -63,10 +63,9 @@ def test_a_node_may_send_and_take(history, roles, database, tmp_path):
         fill(history)  # adds, changes and replaces
         keep_renewal(history, VALVE, START + 10**9)  # deletes
         history.add(success(START + 9, valve=VALVE._replace(tag="renamed")))
-        deadline = time.monotonic() + 60
-        while all_of(History(database)) != all_of(history):
-            assert time.monotonic() < deadline, sender.state
-            time.sleep(0.1)
+        wait_until(
+            lambda: all_of(History(database)) == all_of(history), lambda: sender.state, turn=0.1
+        )
         assert sender.state.problem is None
     finally:
         sender.end()

@@ -16,9 +16,11 @@ import sys
 import threading
 import time
 from contextlib import closing, contextmanager
+from functools import partial
 from pathlib import Path
 
 import pytest
+import waiting
 from full_history import BUILT, all_of, answer, fill, service_move
 from histories import DAY, OTHER, START, VALVE, refused, success
 
@@ -46,11 +48,7 @@ WRITER = HERE / "sending_writer.py"
 _PATIENCE = 90.0
 
 
-def wait_until(condition, told=lambda: ""):
-    deadline = time.monotonic() + _PATIENCE
-    while not condition():
-        assert time.monotonic() < deadline, told()
-        time.sleep(0.02)
+wait_until = partial(waiting.wait_until, patience=_PATIENCE)
 
 
 @contextmanager

@@ -17,7 +17,7 @@ from histories import START, success
 from live_nodes import STREAM, values_of
 from sensor_msgs.msg import FluidPressure, JointState
 
-from benchmark.soak.nonsense import PERIOD, TOLD_WITHIN, Nonsense, said
+from benchmark.soak.feed import PERIOD, TOLD_WITHIN, Nonsense, said
 from valve_friction_ros.health import Baseline
 from valve_friction_ros.history import KeptBaseline, KeptValve
 

@@ -21,6 +21,7 @@ from pathlib import Path
 import pytest
 from live_nodes import PATIENCE
 from records import quick_record
+from waiting import wait_until
 
 from valve_friction_ros.health import (
     FrictionMonitor,
@@ -105,10 +106,8 @@ def test_a_process_ends_when_nobody_needs_it(monkeypatch):
     monkeypatch.setattr(module, "_KEPT", 0.05)
     processes = Processes()
     first = processes.done(os.getpid)
-    deadline = time.monotonic() + PATIENCE
-    while Path(f"/proc/{first}").exists():  # not even as a zombie
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
+    # not even as a zombie
+    wait_until(lambda: not Path(f"/proc/{first}").exists(), patience=PATIENCE)
     assert processes.done(os.getpid) != first
     processes.end()
 
@@ -128,10 +127,7 @@ def test_it_ends_with_its_parent_though_it_works():
         [sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=PATIENCE
     )
     assert parent.returncode == -signal.SIGKILL
-    child, deadline = int(parent.stdout), time.monotonic() + PATIENCE
-    while is_running(child):
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
+    wait_until(lambda: not is_running(int(parent.stdout)), patience=PATIENCE)
 
 
 def is_running(process):
@@ -186,10 +182,7 @@ def test_what_is_compiled_without_a_place_is_known_here(monkeypatch):
     monkeypatch.setattr(workers_module, "find_cache", no_cache)
     monkeypatch.setattr(workers_module, "compile_methods", os.getpid)
     with running_workers(processes=1) as workers:
-        deadline = time.monotonic() + PATIENCE
-        while workers.identify.is_preparing:
-            assert time.monotonic() < deadline
-            time.sleep(0.01)
+        wait_until(lambda: not workers.identify.is_preparing, patience=PATIENCE)
         assert not compiled.kernels_are_cached()
 
 

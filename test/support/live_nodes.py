@@ -18,7 +18,6 @@ import time
 from pathlib import Path
 
 import numpy as np
-import rclpy
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray
 from extension.diagnostic_keys import is_explained
@@ -30,12 +29,13 @@ from rcl_interfaces.srv import (
     SetParametersAtomically,
 )
 from rclpy.duration import Duration
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import FluidPressure, JointState
 from std_msgs.msg import Float64, Float64MultiArray
 from std_srvs.srv import Trigger
+
+from benchmark.harness.participant import Participant
 
 PROJECT = Path(__file__).resolve().parents[2]
 NAMESPACE = "/fv_101"
@@ -162,25 +162,16 @@ class NodeProcess:
             self._process.wait()
 
 
-class Client:
+class Client(Participant):
     """What people and programs do with the nodes: publish, listen, call, set parameters."""
 
     def __init__(self, domain):
-        self.context = rclpy.Context()
-        rclpy.init(args=[], context=self.context, domain_id=domain.number)
-        self.node = rclpy.create_node("tester", context=self.context, enable_rosout=False)
-        self._executor = SingleThreadedExecutor(context=self.context)
-        self._executor.add_node(self.node)
+        super().__init__("tester", domain.number)
         self._callers = {}
         self.watched = []
         self.statuses = []
         self.node.create_subscription(DiagnosticArray, "/diagnostics", self._on_diagnostics, 100)
         self._pressure = self._stem = None
-
-    def close(self):
-        self._executor.shutdown()
-        self.node.destroy_node()
-        self.context.try_shutdown()
 
     # Waiting
 
@@ -196,9 +187,7 @@ class Client:
 
     def drain(self, seconds=0.5):
         """Take what nodes that have ended have left under way."""
-        end = time.monotonic() + seconds
-        while time.monotonic() < end:
-            self._executor.spin_once(timeout_sec=0.02)
+        self.spin(seconds)
 
     def call(self, kind, name, request):
         """Call a service and return its response.

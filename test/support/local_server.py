@@ -10,17 +10,11 @@
 """What a server on this machine needs: a free port, and a certificate."""
 
 import shutil
-import socket
 import subprocess
 
 import pytest
 
-
-def free_port():
-    """A port of this machine that nobody listens at."""
-    with socket.socket() as tried:
-        tried.bind(("127.0.0.1", 0))
-        return tried.getsockname()[1]
+from benchmark.harness.processes import free_port  # noqa: F401 - of tests
 
 
 def certificate_pair(folder):

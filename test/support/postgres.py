@@ -11,7 +11,7 @@
 
 import pytest
 
-from benchmark.postgres_server import PostgresServer, why_no_server
+from benchmark.harness.postgres import PostgresServer, why_no_server
 
 
 def require_postgres():

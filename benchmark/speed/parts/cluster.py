@@ -19,12 +19,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from benchmark.harness.rows import Row
+from benchmark.speed.measuring import Settings
 from benchmark.speed.parts.fleet import Cost, cost_of, recordings, timed, write_recordings
-from benchmark.speed.rows import Row, Settings
 from valve_friction_ros.fleet import in_processes
 from valve_friction_ros.fleet.cluster import Cluster, cluster_at, in_cluster
-
-__all__ = ["measure"]
 
 _WORKERS = (1, 2)
 _OVERHEAD, _GAIN = 1.15, 1.8

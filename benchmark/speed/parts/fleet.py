@@ -25,8 +25,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmark.speed.records import noisy_record
-from benchmark.speed.rows import Row, Settings
+from benchmark.harness.rows import Row
+from benchmark.speed.measuring import Settings, noisy_record
 from valve_friction_ros.fleet import (
     DeadWorker,
     Job,
@@ -39,8 +39,6 @@ from valve_friction_ros.identification import DEFAULT_METHOD, IdentificationSett
 from valve_friction_ros.model import BENCH_VALVE, HIGH_FRICTION, SensorNoise
 from valve_friction_ros.records.recordings import ReadingOptions
 
-__all__ = ["Cost", "cost_of", "measure", "recordings", "timed", "write_recordings"]
-
 _FILES = 4
 _RECORDINGS_A_PROCESS = 12
 _SHARE = 0.8
@@ -52,21 +50,11 @@ def write_recordings(folder: Path) -> list[Path]:
     for seed in range(_FILES):
         record = noisy_record(HIGH_FRICTION, SensorNoise(10e-6, 100.0, seed))
         table = np.column_stack((record.time, record.position, record.pressure))
-        path = folder / f"{seed}.csv"
-        np.savetxt(
-            path,
-            table,
-            fmt=("%.3f", "%.9f", "%.3f"),
-            delimiter=",",
-            header="time_s,position_m,pressure_pa",
-            comments="",
-        )
+        path, header = folder / f"{seed}.csv", "time_s,position_m,pressure_pa"
+        form = ("%.3f", "%.9f", "%.3f")
+        np.savetxt(path, table, form, delimiter=",", header=header, comments="")
         paths.append(path)
     return paths
-
-
-def _never() -> bool:
-    return False
 
 
 class _Answer(NamedTuple):
@@ -125,30 +113,19 @@ def measure(settings: Settings) -> Iterator[Row]:
         for repeat in range(settings.repeats):
             for processes, found in costs.items():
                 settings.say(f"{processes} processes, {repeat + 1} of {settings.repeats}")
-                answers = in_processes(timed, recordings(paths, processes), processes, _never)
+                answers = in_processes(
+                    timed, recordings(paths, processes), processes, lambda: False
+                )
                 found.append(cost_of(answers, processes))
     one, every = (
         Cost(*(statistics.median(column) for column in zip(*costs[processes], strict=True)))
         for processes in (1, cores)
     )
-    wanted = _SHARE * cores
-    yield Row(
-        f"seconds a recording, {cores} processes",
-        every.wall,
-        "s",
-        one.wall,
-        "one process",
-        f"at least {wanted:.1f} times faster",
-        one.wall >= wanted * every.wall,
-    )
+    wanted, peer = _SHARE * cores, "one process"
+    goal, met = f"at least {wanted:.1f} times faster", one.wall >= wanted * every.wall
+    yield Row(f"seconds a recording, {cores} processes", every.wall, "s", one.wall, peer, goal, met)
     yield Row(f"recordings a second, {cores} processes", 1 / every.wall, "1/s")
     yield Row("recordings a second, one process", 1 / one.wall, "1/s")
-    yield Row(
-        f"processor seconds a recording, {cores} processes",
-        every.processor,
-        "s",
-        one.processor,
-        "one process",
-        f"at most 1/{_SHARE} of it",
-        _SHARE * every.processor <= one.processor,
-    )
+    item = f"processor seconds a recording, {cores} processes"
+    goal, met = f"at most 1/{_SHARE} of it", _SHARE * every.processor <= one.processor
+    yield Row(item, every.processor, "s", one.processor, peer, goal, met)

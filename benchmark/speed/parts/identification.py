@@ -9,19 +9,18 @@
 
 """Identification of a minute by the default method, in a running process and as a command."""
 
-import os
+import contextlib
 import subprocess
-import sys
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 
+from benchmark.harness.processes import module
+from benchmark.harness.rows import Row
 from benchmark.plants import PLANTS
-from benchmark.speed.records import PERIOD, SAMPLES, pressure
-from benchmark.speed.rows import Row, Settings, medians
+from benchmark.speed.measuring import PERIOD, SAMPLES, Settings, medians, pressure
 from valve_friction_ros.identification import RefusalError, identify, published_estimate
 from valve_friction_ros.model import Recording, SensorNoise, Valve
-
-__all__ = ["measure"]
 
 _RECORDS = {
     "100 Hz, 10 µm / 100 Pa": (10, SensorNoise(10e-6, 100.0, 1)),
@@ -42,14 +41,10 @@ _COMMANDS = {
 """Arguments of a command, and its goal, s."""
 
 
-def _tried(
-    identification: Callable[[Recording, Valve], object], one: Recording, valve: Valve
-) -> None:
+def _tried(do: Callable[[Recording, Valve], object], one: Recording, valve: Valve) -> None:
     """Identify, or be refused; both take their time."""
-    try:
-        identification(one, valve)
-    except RefusalError:
-        return
+    with contextlib.suppress(RefusalError):
+        do(one, valve)
 
 
 def measure(settings: Settings) -> Iterator[Row]:
@@ -65,9 +60,7 @@ def measure(settings: Settings) -> Iterator[Row]:
             settings.say(f"identification, {item}")
             seconds = medians(
                 {
-                    each.__name__: lambda do=each, one=record, valve=plant.valve: _tried(
-                        do, one, valve
-                    )
+                    each.__name__: partial(_tried, each, record, plant.valve)
                     for each in (identify, published_estimate)
                 },
                 settings.repeats,
@@ -80,11 +73,7 @@ def measure(settings: Settings) -> Iterator[Row]:
             yield Row(item, 1e3 * ours, "ms", peer, *told)
     for item, (arguments, goal) in _COMMANDS.items():
         settings.say(item)
-        seconds = medians({item: lambda given=arguments: _command(given)}, settings.repeats)
+        command = module("valve_friction_ros", "identify", *arguments)
+        run = partial(subprocess.run, command, cwd=_EXAMPLES, check=True, capture_output=True)
+        seconds = medians({item: run}, settings.repeats)
         yield Row(item, seconds[item], "s", None, "", f"{goal:g} s", seconds[item] <= goal)
-
-
-def _command(arguments: list[str]) -> None:
-    """Run the command as a process of its own."""
-    command = [sys.executable, "-m", "valve_friction_ros", "identify", *arguments]
-    subprocess.run(command, cwd=_EXAMPLES, check=True, capture_output=True, env=os.environ)

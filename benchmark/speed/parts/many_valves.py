@@ -17,11 +17,10 @@ import time
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from benchmark.speed.node_processes import Observer, observer
-from benchmark.speed.parts.streams import Outcome, fed, fleet
-from benchmark.speed.rows import Row, Settings
-
-__all__ = ["measure"]
+from benchmark.harness.rows import Row, at_most, under
+from benchmark.speed.measuring import Settings
+from benchmark.speed.observer import Observer, fleet
+from benchmark.speed.parts.streams import Outcome, fed
 
 _FEW, _MANY = 100, 500
 _RATE = 1000
@@ -40,46 +39,35 @@ def _found(count: int, settings: Settings) -> _Found:
     answers = [0.0]
 
     def ask(_: Observer) -> None:
-        with observer(listens=False) as client:
+        with Observer(listens=False) as client:
             for valve in valves[:_IDENTIFIED]:
                 client.meet(valve, "identify")
-            client.wait(client.ask(valves[-1], "restore_baseline"))
+            client.told(valves[-1], "restore_baseline")
             working = [client.ask(valve, "identify") for valve in valves[:_IDENTIFIED]]
             while not all(one.done() for one in working):
                 begin = time.monotonic()
-                client.wait(client.ask(valves[-1], "restore_baseline"))  # refused, at once
+                client.told(valves[-1], "restore_baseline")  # refused, at once
                 answers.append(time.monotonic() - begin)
                 client.spin(0.1)
 
-    outcome = fed(
-        lambda _: fleet(count, 60.0), valves, _RATE, settings.seconds + 50, ["--blocks"], ask
-    )
+    seconds, blocks = settings.seconds + 50, ["--blocks"]
+    outcome = fed(lambda _: fleet(valves, 60.0), valves, _RATE, seconds, blocks, ask)
     return _Found(outcome, max(answers))
 
 
 def _rows(few: _Found, many: _Found) -> Iterable[Row]:
     times, peer = _MANY // _FEW, f"{_MANY // _FEW} × {_FEW} valves"
     (one, _), (all_of, answer) = few, many
-    wall, cpu = all_of.seconds_to_start, all_of.cpu_to_start
-    yield Row("start to the last diagnostic", wall, "s", None, "", "at most 8 s", wall <= 8)
+    cpu = all_of.cpu_to_start
+    yield at_most("start to the last diagnostic", all_of.seconds_to_start, "s", 8)
     yield Row("processor time until then", cpu, "CPU s", times * one.cpu_to_start, peer)
-    memory, goal = all_of.megabytes, "under 1500 MB"
-    yield Row(
-        "memory, windows of 60 s", memory, "MB", times * one.megabytes, peer, goal, memory < 1500
-    )
+    memory, few_of = all_of.megabytes, times * one.megabytes
+    yield under("memory, windows of 60 s", memory, "MB", 1500, few_of, peer)
     busy, goal = all_of.busy, "under one core"
     yield Row("1 kHz in blocks of 100", busy, "cores", times * one.busy, peer, goal, busy < 1)
     yield Row("no stream", all_of.idle, "cores", times * one.idle, peer)
-    goal = "under 1 s"
-    yield Row(
-        "longest answer while others identify",
-        answer,
-        "s",
-        few.answer,
-        f"{_FEW} valves",
-        goal,
-        answer < 1,
-    )
+    item = "longest answer while others identify"
+    yield under(item, answer, "s", 1, few.answer, f"{_FEW} valves")
 
 
 def measure(settings: Settings) -> Iterable[Row]:

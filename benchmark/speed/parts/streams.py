@@ -14,25 +14,24 @@ A stream has lost nothing if the identifier's buffer holds every sample that was
 """
 
 import statistics
-import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
-from benchmark.speed.node_processes import Observer, Process, observer
-from benchmark.speed.rows import Row, Settings
+from benchmark.harness.processes import Process, module
+from benchmark.harness.rows import Row, at_most
+from benchmark.speed.measuring import Settings
+from benchmark.speed.observer import Observer, fleet, identifier
 from valve_friction_ros.model import BENCH_VALVE
 from valve_friction_ros.streams import RecordBuffer, rows_arrived
-
-__all__ = ["Outcome", "fed", "fleet", "measure"]
 
 _OURS = "valve_friction_ros.nodes.identifier"
 _PEER = "benchmark.speed.typed_identifier"
 _PEER_NAME = "typed, default executor"
 _VALVE = "fv_1"
-_NO_HISTORY = ("-p", "history_file:=''")
-_VALVES = [f"fv_{number}" for number in range(500)]
+_VALVES = [f"fv_{number}" for number in range(100)]
 _SETTLING = 3.0
 _CHILD_ENDS = 12.0
 """Time, s, after which the process that has identified has ended."""
@@ -52,36 +51,18 @@ class Outcome(NamedTuple):
     megabytes: float
 
 
-def _identifier(module: str, window: float) -> Process:
-    arguments = [
-        "--ros-args",
-        *_NO_HISTORY,
-        "-r",
-        f"__ns:=/{_VALVE}",
-        "-p",
-        f"window:={window:.1f}",
-    ]
-    return Process(module, arguments)
+def _ours(window: float) -> Process:
+    return identifier(_OURS, _VALVE, window)
 
 
-def fleet(count: int, window: float) -> Process:
-    """Start the identifiers of some valves in one process."""
-    valves = ",".join(_VALVES[:count])
-    arguments = [
-        "--ros-args",
-        *_NO_HISTORY,
-        "-p",
-        f"valves:=[{valves}]",
-        "-p",
-        f"window:={window:.1f}",
-    ]
-    return Process("valve_friction_ros.nodes.identifiers", arguments, own_profile=True)
+def _peer(window: float) -> Process:
+    return identifier(_PEER, _VALVE, window)
 
 
-def _cost(process: Process, listener: Observer, seconds: float) -> float:
-    before, begin = process.cpu(), time.monotonic()
-    listener.spin(seconds)
-    return (process.cpu() - before) / (time.monotonic() - begin)
+def _source(valves: Sequence[str], rate: int, seconds: float, *options: str) -> Process:
+    """Start what streams to some valves."""
+    stream = ("--rate", str(rate), "--seconds", str(seconds), *options)
+    return Process(module("benchmark.speed.stream_source", *valves, *stream))
 
 
 def _nothing(_: Observer) -> None:
@@ -97,32 +78,33 @@ def fed(
     meanwhile: Callable[[Observer], object] = _nothing,
 ) -> Outcome:
     """Start identifiers, stream for `seconds`, and count what arrived."""
-    with observer() as listener, start(2 * seconds + 60) as process:
+    with Observer() as listener, start(2 * seconds + 60) as process:
         if not listener.wait_for(valves, process):
             raise RuntimeError("the identifiers do not publish their diagnostics")
-        started, spent = max(listener.first_seen.values()) - process.begin, process.cpu()
+        started = max(listener.first_seen.values()) - process.begin
+        spent = process.usage().processor
         listener.spin(_SETTLING)
-        idle = _cost(process, listener, 5.0)
-        stream = ["--rate", str(rate), "--seconds", str(seconds), *options]
-        with Process("benchmark.speed.stream_source", [*valves, *stream]) as source:
+        idle = listener.cost(process, 5.0)
+        with _source(valves, rate, seconds, *options) as source:
             listener.wait_for(valves, process, 1)
-            busy = _cost(process, listener, seconds - 2 * _SETTLING)
+            busy = listener.cost(process, seconds - 2 * _SETTLING)
             meanwhile(listener)
             sent = 2 * int(source.output.readline())
             listener.wait_for(valves, process, sent)
         arrived = min(listener.buffered.values())
-        return Outcome(idle, busy, sent, arrived, started, spent, process.resident())
+        return Outcome(idle, busy, sent, arrived, started, spent, process.usage().memory)
 
 
 def _one_valve(settings: Settings) -> Iterator[Row]:
     seconds = min(settings.seconds, _LONGEST_REPEAT)
-    found: dict[str, list[Outcome]] = {_OURS: [], _PEER: []}
+    found: dict[Callable[[float], Process], list[Outcome]] = {_ours: [], _peer: []}
     for repeat in range(settings.repeats):
-        for module, outcomes in found.items():
-            settings.say(f"1 kHz × 2 topics, {module}, {repeat + 1} of {settings.repeats}")
-            outcomes.append(fed(lambda w, m=module: _identifier(m, w), [_VALVE], 1000, seconds))
+        for start, outcomes in found.items():
+            name = start.__name__.strip("_")
+            settings.say(f"1 kHz × 2 topics, {name}, {repeat + 1} of {settings.repeats}")
+            outcomes.append(fed(start, [_VALVE], 1000, seconds))
     busy, idle = (
-        [statistics.median(getattr(one, name) for one in found[which]) for which in (_OURS, _PEER)]
+        [statistics.median(getattr(one, name) for one in some) for some in found.values()]
         for name in ("busy", "idle")
     )
     goal = "at most a fifth"
@@ -134,23 +116,20 @@ def _start(settings: Settings) -> Iterator[Row]:
     walls, costs = [], []
     for repeat in range(settings.repeats):
         settings.say(f"start, {repeat + 1} of {settings.repeats}")
-        with observer() as listener, _identifier(_OURS, 60.0) as process:
+        with Observer() as listener, _ours(60.0) as process:
             walls.append(listener.wait_for_answer(_VALVE) - process.begin)
-            costs.append(process.cpu())
-    wall = statistics.median(walls)
-    goal, met = "at most 1.5 s", wall <= 1.5
-    yield Row("start to first answer of a service", wall, "s", None, "", goal, met)
+            costs.append(process.usage().processor)
+    yield at_most("start to first answer of a service", statistics.median(walls), "s", 1.5)
     yield Row("processor time until then", statistics.median(costs), "CPU s")
 
 
 def _memory_of_a_node(settings: Settings) -> Iterator[Row]:
     """Fill a window of 60 s at 1 kHz; identify it, and write reports on it."""
     settings.say("memory with a full window")
-    goal, reports = "at most 150 MB", 20
-    with observer() as listener, _identifier(_OURS, 60.0) as process:
+    reports = 20
+    with Observer() as listener, _ours(60.0) as process:
         listener.wait_for([_VALVE], process)
-        stream = [_VALVE, "--rate", "1000", "--seconds", "65"]
-        with Process("benchmark.speed.stream_source", stream) as source:
+        with _source([_VALVE], 1000, 65.0) as source:
             source.output.readline()
         listener.wait_for([_VALVE], process, 120_000)
         for when, service, times in (
@@ -158,15 +137,13 @@ def _memory_of_a_node(settings: Settings) -> Iterator[Row]:
             ("after an identification", "identify", 1),
             (f"after {reports} reports", "report", reports),
         ):
-            answers = []
             for _ in range(times):
-                answers.append(future := listener.ask(_VALVE, service))
-                listener.wait(future)
-            if not all(one.result().success for one in answers):
-                raise RuntimeError(f"{service}: {answers[-1].result().message}")
+                answer = listener.told(_VALVE, service)
+                if answer is None or not answer.success:
+                    raise RuntimeError(f"{service}: {answer}")
             listener.spin(_CHILD_ENDS)
-            size, share = process.resident(), process.proportional()
-            yield Row(f"memory {when}", size, "MB", share, "PSS", goal, size <= 150)
+            size, share = process.usage().memory, process.proportional()
+            yield at_most(f"memory {when}", size, "MB", 150, share, "PSS")
 
 
 def _share(outcome: Outcome) -> float:
@@ -175,10 +152,10 @@ def _share(outcome: Outcome) -> float:
 
 def _ten_kilohertz(settings: Settings) -> Iterator[Row]:
     settings.say(f"10 kHz × 2 topics for {settings.seconds:g} s")
-    ours = fed(lambda w: _identifier(_OURS, w), [_VALVE], 10_000, settings.seconds)
+    ours = fed(_ours, [_VALVE], 10_000, settings.seconds)
     settings.say("10 kHz × 2 topics, typed")
     seconds = min(settings.seconds, _LONGEST_REPEAT)
-    peer = fed(lambda w: _identifier(_PEER, w), [_VALVE], 10_000, seconds)
+    peer = fed(_peer, [_VALVE], 10_000, seconds)
     item = f"10 kHz × 2 topics for {settings.seconds:g} s"
     yield Row(item, ours.busy, _UNIT, peer.busy, f"{_PEER_NAME}, {seconds:g} s")
     goal, met = "nothing lost", ours.arrived == ours.sent
@@ -192,9 +169,10 @@ def _while_identifying(settings: Settings) -> Iterator[Row]:
 
     def identify(listener: Observer) -> None:
         while len(answers) < 3:
-            answers.append(listener.identify(_VALVE)[0])
+            answer = listener.told(_VALVE, "identify")
+            answers.append(answer is not None and answer.success)
 
-    ours = fed(lambda w: _identifier(_OURS, w), [_VALVE], 1000, 2 * seconds, meanwhile=identify)
+    ours = fed(_ours, [_VALVE], 1000, 2 * seconds, meanwhile=identify)
     goal, met = "nothing lost", ours.arrived == ours.sent and all(answers)
     yield Row("arrived during three identifications", _share(ours), "%", None, "", goal, met)
 
@@ -202,16 +180,16 @@ def _while_identifying(settings: Settings) -> Iterator[Row]:
 def _many_valves(settings: Settings) -> Iterator[Row]:
     settings.say("10 valves in one process, 1 kHz × 2 topics each")
     seconds = min(settings.seconds, _LONGEST_REPEAT)
-    topics = fed(lambda w: fleet(10, w), _VALVES[:10], 1000, seconds)
+    ten = _VALVES[:10]
+    topics = fed(partial(fleet, ten), ten, 1000, seconds)
     yield Row("10 valves in one process, 1 kHz × 2 topics", topics.busy, _UNIT)
     yield Row("of that arrived at the valve with the least", _share(topics), "%")
     settings.say("100 valves, blocks of 100 samples")
-    blocks = fed(lambda w: fleet(100, w), _VALVES[:100], 1000, settings.seconds, ["--blocks"])
+    blocks = fed(partial(fleet, _VALVES), _VALVES, 1000, settings.seconds, ["--blocks"])
     goal, met = "at most 0.25, none lost", blocks.busy <= 0.25 and blocks.arrived == blocks.sent
     yield Row("100 valves, blocks of 100 at 10 Hz", blocks.busy, _UNIT, None, "", goal, met)
     yield Row("of that arrived at the valve with the least", _share(blocks), "%")
-    goal, met = "at most 400 MB", blocks.megabytes <= 400
-    yield Row("memory of their process", blocks.megabytes, "MB", None, "", goal, met)
+    yield at_most("memory of their process", blocks.megabytes, "MB", 400)
     yield Row("its start to the last first diagnostic", blocks.seconds_to_start, "s")
 
 

@@ -10,18 +10,15 @@
 """The sweep of the velocity threshold, 62.4 s at 1 kHz, 330 thresholds."""
 
 from collections.abc import Iterator
+from functools import partial
 
 import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmark.speed.plain_sweep import incremental_sweep, plain_sweep
-from benchmark.speed.records import VALVES, noisy_record
-from benchmark.speed.rows import Row, Settings, medians
-from valve_friction_ros.identification import (
-    IdentificationSettings,
-    sweep_thresholds,
-)
+from benchmark.harness.rows import Row
+from benchmark.speed.measuring import VALVES, Settings, medians, noisy_record
+from valve_friction_ros.identification import IdentificationSettings, sweep_thresholds
 from valve_friction_ros.identification.published.regression import (
     ForceBalanceRegression,
     force_balance_regression,
@@ -29,7 +26,7 @@ from valve_friction_ros.identification.published.regression import (
 from valve_friction_ros.model import BENCH_VALVE, SensorNoise
 from valve_friction_ros.signals import differentiate
 
-__all__ = ["measure"]
+Floats = NDArray[np.float64]
 
 _ENOUGH = 200
 """Samples above a threshold from which on both sweeps are compared."""
@@ -38,8 +35,62 @@ _TIMES_FASTER = 100
 _AGREEMENT = 1e-7
 
 
+def plain_sweep(
+    columns: Floats, force: Floats, speed: Floats, thresholds: Floats
+) -> tuple[Floats, Floats, Floats]:
+    """Solve (7) by `numpy.linalg.lstsq` above each threshold δv(s), with (17) and (18).
+
+    The regressors (5) have shape (n, p), the estimates (S, p); all are nan where no more samples
+    than regressors are left.
+    """
+    free = columns.shape[1]
+    estimates = np.full((thresholds.size, free), np.nan)
+    sigma, r_squared = np.full((2, thresholds.size), np.nan)
+    for step, threshold in enumerate(thresholds):
+        moving = speed > threshold
+        count = np.count_nonzero(moving)
+        if count <= free + 1:
+            continue
+        estimates[step] = np.linalg.lstsq(columns[moving], force[moving], rcond=None)[0]
+        modelled = columns[moving] @ estimates[step]
+        sigma[step] = np.sqrt(np.sum((force[moving] - modelled) ** 2) / (count - free))
+        mean = force[moving].mean()
+        r_squared[step] = np.sum((modelled - mean) ** 2) / np.sum((force[moving] - mean) ** 2)
+    return estimates, sigma, r_squared
+
+
+def incremental_sweep(
+    columns: Floats, force: Floats, speed: Floats, thresholds: Floats
+) -> tuple[Floats, Floats, Floats]:
+    """Do the same by `numpy.linalg.qr`: from one threshold to the next only new rows are taken in.
+
+    The triangular factor of the rows above a threshold, and the rows between it and the next lower
+    one, have the triangular factor of all rows above that. Parameters and result as `plain_sweep`.
+    """
+    free = columns.shape[1]
+    estimates = np.full((thresholds.size, free), np.nan)
+    sigma, r_squared = np.full((2, thresholds.size), np.nan)
+    steps = np.searchsorted(thresholds, speed)
+    order = np.argsort(steps, kind="stable")
+    ends = np.searchsorted(steps[order], np.arange(1, thresholds.size + 1))
+    parts = np.split(np.column_stack((columns, force))[order], ends)
+    factor, sums, count = np.empty((0, free + 1)), np.zeros(free + 1), 0
+    for step in range(thresholds.size - 1, -1, -1):
+        rows = parts[step + 1]
+        factor = np.linalg.qr(np.vstack((factor, rows)), mode="r")
+        sums, count = sums + rows.sum(axis=0), count + len(rows)
+        if count > free + 1:
+            estimates[step] = np.linalg.solve(factor[:free, :free], factor[:free, free])
+            sigma[step] = abs(factor[free, free]) / np.sqrt(count - free)
+            mean = sums[free] / count
+            modelled = factor[:free, free] @ factor[:free, free]
+            modelled += mean * (count * mean - 2 * sums[:free] @ estimates[step])
+            r_squared[step] = modelled / (factor[:, free] @ factor[:, free] - count * mean**2)
+    return estimates, sigma, r_squared
+
+
 @numba.njit
-def _read_through(columns: NDArray[np.float64]) -> float:
+def _read_through(columns: Floats) -> float:
     """Add up all columns: what merely reading them costs."""
     total = 0.0
     for row in range(columns.shape[0]):
@@ -58,7 +109,7 @@ def _regression(valve_name: str, samples: int) -> ForceBalanceRegression:
     return force_balance_regression(force, record.position, derivatives, settings)
 
 
-def _thresholds(regression: ForceBalanceRegression, steps: int) -> NDArray[np.float64]:
+def _thresholds(regression: ForceBalanceRegression, steps: int) -> Floats:
     return float(regression.speed.max()) * 330 / 350 * np.arange(1, steps + 1) / steps
 
 
@@ -79,71 +130,34 @@ def measure(settings: Settings) -> Iterator[Row]:
     for name in VALVES:
         regression, double = _regression(name, 62_400), _regression(name, 124_800)
         thresholds, few = _thresholds(regression, 330), _thresholds(regression, 33)
+        known = regression.columns, regression.force, regression.speed, thresholds
         settings.say(f"sweep, {name} friction")
         seconds = medians(
             {
-                "ours": lambda one=regression, at=thresholds: sweep_thresholds(one, at),
-                "few": lambda one=regression, at=few: sweep_thresholds(one, at),
-                "double": lambda one=double, at=thresholds: sweep_thresholds(one, at),
-                "floor": lambda one=regression: _read_through(one.columns),
-                "incremental": lambda one=regression, at=thresholds: incremental_sweep(
-                    one.columns, one.force, one.speed, at
-                ),
+                "ours": partial(sweep_thresholds, regression, thresholds),
+                "few": partial(sweep_thresholds, regression, few),
+                "double": partial(sweep_thresholds, double, thresholds),
+                "floor": partial(_read_through, regression.columns),
+                "incremental": partial(incremental_sweep, *known),
             },
             8 * settings.repeats,
-        ) | medians(
-            {
-                "plain": lambda one=regression, at=thresholds: plain_sweep(
-                    one.columns, one.force, one.speed, at
-                )
-            },
-            settings.repeats,
-        )
-        milliseconds = {what: 1e3 * one for what, one in seconds.items()}
-        yield Row(
-            f"sweep, {name} friction",
-            milliseconds["ours"],
-            "ms",
-            milliseconds["plain"],
-            "numpy.linalg.lstsq for each threshold",
-            f"{_TIMES_FASTER} times faster",
-            milliseconds["plain"] >= _TIMES_FASTER * milliseconds["ours"],
-        )
-        yield Row(
-            f"sweep, {name} friction",
-            milliseconds["ours"],
-            "ms",
-            milliseconds["incremental"],
-            "numpy.linalg.qr, each row taken in once",
-        )
+        ) | medians({"plain": partial(plain_sweep, *known)}, settings.repeats)
+        time = {what: 1e3 * one for what, one in seconds.items()}
+        item, ours = f"sweep, {name} friction", time["ours"]
+        peer, goal = "numpy.linalg.lstsq for each threshold", f"{_TIMES_FASTER} times faster"
+        met = time["plain"] >= _TIMES_FASTER * ours
+        yield Row(item, ours, "ms", time["plain"], peer, goal, met)
+        peer = "numpy.linalg.qr, each row taken in once"
+        yield Row(item, ours, "ms", time["incremental"], peer)
         difference = _largest_difference(regression)
-        yield Row(
+        told, met = (
             f"largest relative difference from it, {name} friction",
-            difference,
-            "",
-            goal=f"{_AGREEMENT:g} wherever {_ENOUGH} samples are left",
-            met=difference <= _AGREEMENT,
+            difference <= _AGREEMENT,
         )
-        yield Row(
-            f"sweep, {name} friction",
-            milliseconds["ours"],
-            "ms",
-            milliseconds["floor"],
-            "one compiled pass that reads the columns",
-        )
-        yield Row(
-            f"twice the samples, {name} friction",
-            milliseconds["double"],
-            "ms",
-            milliseconds["ours"],
-            "62 400 samples",
-            "linear: at most 2.5 times",
-            milliseconds["double"] <= 2.5 * milliseconds["ours"],
-        )
-        yield Row(
-            f"33 thresholds, {name} friction",
-            milliseconds["few"],
-            "ms",
-            milliseconds["ours"],
-            "330 thresholds",
-        )
+        goal = f"{_AGREEMENT:g} wherever {_ENOUGH} samples are left"
+        yield Row(told, difference, goal=goal, met=met)
+        yield Row(item, ours, "ms", time["floor"], "one compiled pass that reads the columns")
+        item, twice = f"twice the samples, {name} friction", time["double"]
+        told = "62 400 samples", "linear: at most 2.5 times", twice <= 2.5 * ours
+        yield Row(item, twice, "ms", ours, *told)
+        yield Row(f"33 thresholds, {name} friction", time["few"], "ms", ours, "330 thresholds")

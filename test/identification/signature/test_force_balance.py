@@ -7,12 +7,14 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The valve signature and the paper's model 2, on valves whose truth is known."""
+"""The valve signature and the paper's model 2, and the onset of motions, known beforehand."""
 
 import math
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from valve_friction_ros.identification import (
     IdentificationSettings,
@@ -20,6 +22,7 @@ from valve_friction_ros.identification import (
     Verdict,
     identify_signature,
 )
+from valve_friction_ros.identification.signature.strokes import fit_onset
 from valve_friction_ros.identification.signature.valve_signature import valve_signature
 from valve_friction_ros.model import (
     BENCH_VALVE,
@@ -261,3 +264,55 @@ def test_slow_sampling_and_a_converter_without_lag(benches):
         found = identify_signature(Recording(0.01, pressure, position), BENCH_VALVE)
         assert found.values["coulomb_friction"] == pytest.approx(606.0, rel=5e-3)
         assert math.isclose(found.values["viscous_friction"], 4.48e4, rel_tol=0.05)
+
+
+TIME = np.arange(2000) * 1e-3
+REST = 5e-3
+
+
+def motion(onset, lag, speed, jump=0.0, growth=0.0):
+    """Position of a stem without inertia under a force that grows from the onset on."""
+    since = np.maximum(TIME - onset, 0.0)
+    fade = 1 - np.exp(-since / lag)
+    steady = since - lag * fade
+    return (
+        REST
+        + speed * (steady + growth * (since**2 / 2 - lag * steady))
+        + np.sign(speed) * jump * lag * fade
+    )
+
+
+@settings(max_examples=20)
+@given(
+    onset=st.floats(0.7, 1.2),
+    lag=st.floats(0.02, 0.4),
+    speed=st.floats(1e-4, 1e-2),
+    way=st.sampled_from([1.0, -1.0]),
+    growth=st.floats(-0.2, 0.2),
+)
+def test_growing_force(onset, lag, speed, way, growth):
+    found = fit_onset(TIME, motion(onset, lag, way * speed, growth=growth), onset + 0.05, growth)
+    assert found.time == pytest.approx(onset, abs=1e-4)
+    assert found.level == pytest.approx(REST, abs=1e-3 * speed)
+    assert found.jump_speed == 0.0
+
+
+@pytest.mark.parametrize("way", [1.0, -1.0])
+@pytest.mark.parametrize("lag", [0.1, 0.34])
+def test_slip_jump(way, lag):
+    found = fit_onset(TIME, motion(0.9, lag, way * 1.2e-3, jump=4e-3), 0.8)
+    assert found.time == pytest.approx(0.9, abs=1e-5)
+    assert found.level == pytest.approx(REST, abs=1e-9)
+    assert found.jump_speed == pytest.approx(4e-3, rel=1e-4)
+
+
+def test_noise_moves_the_onset_by_less_than_a_threshold_would():
+    """A threshold of four deviations would be passed 0.2 s late."""
+    noise = 28.6e-6 * np.random.default_rng(0).standard_normal((10, TIME.size))
+    errors = [fit_onset(TIME, motion(0.9, 0.22, 1.2e-3) + one, 1.0).time - 0.9 for one in noise]
+    assert np.sqrt(np.mean(np.square(errors))) < 0.02
+
+
+def test_too_few_samples():
+    with pytest.raises(ValueError, match="7 samples are too few for an onset, at least 8"):
+        fit_onset(TIME[:7], TIME[:7], 0.0)

@@ -7,22 +7,24 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""A server of the history of the plant's own, and whether it holds what the file holds."""
+"""What a plant stands on, and faults may take away: a small disk, and a server of the history."""
 
 import contextlib
 import sqlite3
+import subprocess
+import uuid
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from benchmark.postgres_server import PostgresServer, running_server
+from benchmark.harness.postgres import PostgresServer, running_server
 from valve_friction_ros.history import copied
 from valve_friction_ros.history.outbox import count_unsent
 from valve_friction_ros.history.place import HistoryServer
 
-__all__ = ["Database", "Kept", "own_database"]
-
 _COUNT = "SELECT count(*) FROM identification"
+_SIZE = "64m"
+_CHUNK = 2**16
 
 
 class Kept(NamedTuple):
@@ -46,13 +48,7 @@ class Kept(NamedTuple):
 
 
 class Database:
-    """A database on a server that may be ended and held.
-
-    Parameters
-    ----------
-    server : PostgresServer
-        The server.
-    """
+    """A database on a server that may be ended and held."""
 
     def __init__(self, server: PostgresServer) -> None:
         self.server = server
@@ -77,3 +73,31 @@ def own_database() -> Iterator[Database | None]:
     """Provide a new database on a new server; None where no server can be started."""
     with running_server() as server:
         yield None if server is None else Database(server)
+
+
+@contextlib.contextmanager
+def small_disk(folder: Path) -> Iterator[bool]:
+    """Mount a file system of 64 MB in memory on a folder; tell whether that was allowed."""
+    folder.mkdir(parents=True, exist_ok=True)
+    command = ["mount", "-t", "tmpfs", "-o", f"size={_SIZE}", "tmpfs", str(folder)]
+    is_mounted = False
+    with contextlib.suppress(FileNotFoundError):
+        is_mounted = subprocess.run(command, capture_output=True, check=False).returncode == 0
+    try:
+        yield is_mounted
+    finally:
+        if is_mounted:
+            subprocess.run(["umount", "-l", str(folder)], check=False)
+
+
+@contextlib.contextmanager
+def filled(folder: Path) -> Iterator[None]:
+    """Leave no room on the disk of a folder."""
+    filler = folder / f"filler_{uuid.uuid4().hex}"  # two faults may fill it at once
+    with contextlib.suppress(OSError), filler.open("wb", buffering=0) as stream:
+        while True:
+            stream.write(bytes(_CHUNK))
+    try:
+        yield
+    finally:
+        filler.unlink()

@@ -7,24 +7,18 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""A ROS domain of this machine that nobody else uses."""
+"""Waiting for what another process or thread does."""
 
-import contextlib
-import os
-from collections.abc import Iterator
+import time
 
-from valve_friction_ros.commands.demo.bench import free_domain
-
-__all__ = ["quiet_domain"]
+PATIENCE = 60.0
+"""Time for one thing to happen on a loaded machine, s."""
 
 
-@contextlib.contextmanager
-def quiet_domain() -> Iterator[int]:
-    """Provide a domain of this machine that nobody else uses."""
-    with free_domain() as domain:
-        os.environ |= {
-            "ROS_DOMAIN_ID": str(domain),
-            "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
-            "RCUTILS_COLORIZED_OUTPUT": "0",
-        }
-        yield domain
+def wait_until(condition, told=lambda: "", patience=PATIENCE, turn=0.01):
+    """Look until `condition()` is true, and return it; fail with what is `told` at the end."""
+    deadline = time.monotonic() + patience
+    while not (met := condition()):
+        assert time.monotonic() < deadline, f"not within {patience:g} s: {told()}"
+        time.sleep(turn)
+    return met

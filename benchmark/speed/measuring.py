@@ -7,8 +7,13 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The records that the parts measure on: 62.4 s of the bench at 1 kHz."""
+"""What the parts measure on, 62.4 s of the bench at 1 kHz; how thoroughly, and by which clock."""
 
+import resource
+import statistics
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from functools import cache
 
 import numpy as np
@@ -26,8 +31,6 @@ from valve_friction_ros.model import (
     converter_response,
     simulate,
 )
-
-__all__ = ["PERIOD", "PRESSURES", "SAMPLES", "VALVES", "noisy_record", "pressure"]
 
 PERIOD = 1e-3
 """Sample period, s."""
@@ -62,3 +65,49 @@ def noisy_record(
     driving = pressure("square", samples)
     stem = simulate(BENCH_VALVE, parameters, driving, PERIOD)
     return noise.applied_to(Recording(PERIOD, driving, stem.position))
+
+
+def _say_nothing(_: str) -> None:
+    pass
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How thoroughly the parts measure.
+
+    Attributes
+    ----------
+    repeats : int
+        Repetitions of each measurement, of which the median counts.
+    seconds : float
+        How long each stream runs, s.
+    say : callable
+        Shows what is being done now.
+    """
+
+    repeats: int = 5
+    seconds: float = 60.0
+    say: Callable[[str], None] = field(default=_say_nothing, repr=False)
+
+
+def _processor_time() -> float:
+    """Return the seconds that this process and its ended children have spent."""
+    children = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return time.process_time() + children.ru_utime + children.ru_stime
+
+
+def medians(functions: Mapping[str, Callable[[], object]], repeats: int) -> dict[str, float]:
+    """Return the median processor time of each function, s.
+
+    They take turns, so that a change of the machine's speed strikes all of them. Each runs once
+    beforehand, unmeasured: compilation and caches are no part of what is compared.
+    """
+    seconds: dict[str, list[float]] = {name: [] for name in functions}
+    for function in functions.values():
+        function()
+    for _ in range(repeats):
+        for name, function in functions.items():
+            begin = _processor_time()
+            function()
+            seconds[name].append(_processor_time() - begin)
+    return {name: statistics.median(times) for name, times in seconds.items()}

@@ -15,7 +15,6 @@ import os
 import pwd
 import shutil
 import signal
-import socket
 import subprocess
 import tempfile
 import time
@@ -24,7 +23,7 @@ from ipaddress import ip_network
 from pathlib import Path
 from typing import Any
 
-__all__ = ["PostgresServer", "running_server", "why_no_server"]
+from benchmark.harness.processes import free_port
 
 _FOLDERS = sorted(Path("/usr/lib/postgresql").glob("*/bin"), key=lambda one: one.parent.name)
 _PATIENCE = 60.0
@@ -58,34 +57,11 @@ def why_no_server() -> str | None:
     return None
 
 
-def _free_port(address: str) -> int:
-    with socket.socket() as probe:
-        probe.bind((address, 0))
-        port: int = probe.getsockname()[1]
-        return port
-
-
 class PostgresServer:
     """A server, with the superuser `owner`; other roles need a password.
 
-    Parameters
-    ----------
-    address : str
-        Where it listens; others of its network of 256 addresses may come too.
-
-    Attributes
-    ----------
-    data : Path
-        Its data directory.
-    folder : Path
-        Its folder, with its log.
-    settings : dict
-        Settings with which it is started.
-
-    Raises
-    ------
-    RuntimeError
-        If no server can be started here, see `why_no_server`.
+    It listens at an address, to which others of its network of 256 addresses may come too; its log
+    is in its folder. RuntimeError is raised where no server can be started, see `why_no_server`.
     """
 
     def __init__(self, address: str = "127.0.0.1") -> None:
@@ -101,7 +77,7 @@ class PostgresServer:
         (self.data / "pg_hba.conf").write_text(
             f"host all owner {near} trust\nhost all all {near} scram-sha-256\n"
         )
-        self.address, self.port = address, _free_port(address)
+        self.address, self.port = address, free_port(address)
         self.settings: dict[str, object] = {
             "port": self.port,
             "unix_socket_directories": self.folder,

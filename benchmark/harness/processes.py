@@ -1,0 +1,213 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""Processes: how they are started and ended, what they use and say, and where they hang."""
+
+import contextlib
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import IO, NamedTuple
+
+CODES = (0, -signal.SIGINT, -signal.SIGTERM)
+"""Exit codes of a node that was told to end; those of the signals before Python minds them."""
+PATIENCE = 20.0
+"""Time, s, after which a process that was told to end is hung."""
+_STACKS_PATIENCE = 60.0
+_START_PATIENCE = 90.0
+"""Time for a process to say what is waited for, s."""
+_TICKS, _PAGE = os.sysconf("SC_CLK_TCK"), os.sysconf("SC_PAGE_SIZE")
+
+
+def module(name: str, *arguments: str) -> list[str]:
+    """Return the command that runs a module of Python."""
+    return [sys.executable, "-m", name, *arguments]
+
+
+def node(executable: str, *arguments: str) -> list[str]:
+    """Return the command that runs a node of the package."""
+    return [str(Path(sys.executable).with_name(executable)), "--ros-args", *arguments]
+
+
+def parameters(**values: object) -> list[str]:
+    """Return the arguments that set parameters of a node."""
+    return [word for name, value in values.items() for word in ("-p", f"{name}:={value}")]
+
+
+def free_port(address: str = "127.0.0.1") -> int:
+    """Return a port of this machine that nobody listens at."""
+    with socket.socket() as tried:
+        tried.bind((address, 0))
+        port: int = tried.getsockname()[1]
+        return port
+
+
+def processor_seconds(process: int) -> float:
+    """Return the processor time that all threads of a process have used, s."""
+    text = Path(f"/proc/{process}/stat").read_text(encoding="ascii")
+    fields = text.rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / _TICKS
+
+
+def resident_megabytes(process: int) -> float:
+    """Return the memory that a process has in use, MB."""
+    text = Path(f"/proc/{process}/statm").read_text(encoding="ascii")
+    return int(text.split()[1]) * _PAGE / 1e6
+
+
+class Usage(NamedTuple):
+    """What a process has used until a time (s): processor time (s); and what it holds."""
+
+    time: float
+    processor: float
+    memory: float
+    threads: int
+    files: int
+
+    def cores_since(self, earlier: "Usage") -> float:
+        """Return the cores used since then."""
+        return (self.processor - earlier.processor) / (self.time - earlier.time)
+
+
+class Process(contextlib.AbstractContextManager["Process"]):
+    """A program that runs, and is ended where the `with` of it ends.
+
+    Parameters
+    ----------
+    command : sequence of str
+        The program and its arguments.
+    log : Path or None
+        File to which its output is added, with the stacks of all its threads if it hangs; None: the
+        output is read here, and its input is open until it is ended.
+    environment : mapping of str to str or None
+        Its environment; None: that of this process.
+    """
+
+    def __init__(
+        self,
+        command: Sequence[str],
+        log: Path | None = None,
+        environment: Mapping[str, str] | None = None,
+    ) -> None:
+        self.command, self._log, self.begin = command, log, time.monotonic()
+        given = (os.environ if environment is None else environment) | {"PYTHONFAULTHANDLER": "1"}
+        with self._output() as stream:
+            self._process = subprocess.Popen(
+                command,
+                env=given,
+                stdin=subprocess.DEVNULL if log else subprocess.PIPE,
+                stdout=stream or subprocess.PIPE,
+                stderr=stream,
+                text=True,
+                start_new_session=True,
+            )
+        self.pid = self._process.pid
+
+    def _output(self) -> contextlib.AbstractContextManager[IO[bytes] | None]:
+        return self._log.open("ab") if self._log else contextlib.nullcontext()
+
+    def __exit__(self, *_: object) -> None:
+        self.end()
+
+    @property
+    def output(self) -> IO[str]:
+        """What it says, of a process without a log."""
+        assert self._process.stdout is not None  # noqa: S101 - it was asked for
+        return self._process.stdout
+
+    def said(self) -> str:
+        """Return what it has written into its log."""
+        return self._log.read_text("utf-8", "replace") if self._log else ""
+
+    def exit_code(self) -> int | None:
+        """Return the exit code; None while it runs."""
+        return self._process.poll()
+
+    def require_running(self) -> None:
+        """Raise RuntimeError if the process has ended."""
+        if (code := self.exit_code()) is not None:
+            raise RuntimeError(f"{self.command} ended with {code}; it said {self.said()}")
+
+    def wait_for(self, words: str) -> float:
+        """Wait until it has said these words; return the time since its start, s."""
+        return self.wait_until(lambda: words in self.said(), words)
+
+    def wait_until(self, is_met: Callable[[], bool], what: str) -> float:
+        """Wait until something is so, while it runs; return the time since its start, s."""
+        while not is_met():
+            self.require_running()
+            if time.monotonic() > self.begin + _START_PATIENCE:
+                raise RuntimeError(f"{self.command}: no {what!r}; it said {self.said()}")
+            time.sleep(0.01)
+        return time.monotonic() - self.begin
+
+    def send(self, request: signal.Signals) -> None:
+        """Send a signal, and wait for nothing."""
+        self._process.send_signal(request)
+
+    def kill(self) -> None:
+        """Kill it, and see it gone."""
+        self._process.kill()
+        self._process.communicate()
+
+    def end(self, request: signal.Signals = signal.SIGTERM) -> float | None:
+        """Send a signal; return the time to the end of the process, s.
+
+        A process that hangs leaves its stacks and is killed; None is returned.
+        """
+        begin = time.monotonic()
+        self._process.send_signal(request)
+        try:
+            self._process.communicate(timeout=PATIENCE)
+        except subprocess.TimeoutExpired:
+            self.write_stacks()
+            return None
+        return time.monotonic() - begin
+
+    def write_stacks(self) -> None:
+        """Write the stacks of all threads, of C where gdb is there and of Python; kill it."""
+        debugger = ("gdb", "-p", str(self.pid), "-batch", "-ex", "thread apply all bt")
+        with self._output() as stream, contextlib.suppress(subprocess.TimeoutExpired):
+            if shutil.which(debugger[0]):
+                subprocess.run(
+                    debugger, stdout=stream, stderr=stream, timeout=_STACKS_PATIENCE, check=False
+                )
+        self._process.send_signal(signal.SIGABRT)  # Python's handler writes its stacks
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self._process.communicate(timeout=_STACKS_PATIENCE)
+        self.kill()
+
+    def usage(self) -> Usage:
+        """Return what it has used so far, and what it holds."""
+        process = Path(f"/proc/{self.pid}")
+        threads, files = (len(list((process / name).iterdir())) for name in ("task", "fd"))
+        processor, memory = processor_seconds(self.pid), resident_megabytes(self.pid)
+        return Usage(time.monotonic(), processor, memory, threads, files)
+
+    def proportional(self) -> float:
+        """Return its memory, MB, what it shares with other processes divided among them."""
+        text = Path(f"/proc/{self.pid}/smaps_rollup").read_text(encoding="ascii")
+        (line,) = (one for one in text.splitlines() if one.startswith("Pss:"))
+        return int(line.split()[1]) * 1024 / 1e6
+
+
+@contextlib.contextmanager
+def running(processes: list[Process]) -> Iterator[list[Process]]:
+    """Provide a list of processes that are ended at the end, the newest first."""
+    try:
+        yield processes
+    finally:
+        for one in reversed(processes):
+            one.end()

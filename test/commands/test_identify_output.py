@@ -1,0 +1,449 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""The sub-command `identify` as people and programs use it: options, table, picture, JSON, code."""
+
+import dataclasses
+import gzip
+import json
+import math
+import re
+import subprocess
+import sys
+
+import matplotlib.image
+import numpy as np
+import pytest
+from answers import KEYS, PARAMETER_KEYS, column, known, none_for_nan, row_of, values
+
+from valve_friction_ros.commands.identify import as_json, print_table
+from valve_friction_ros.identification import (
+    PARAMETER_UNITS,
+    UNITS,
+    IdentificationSettings,
+    Parameter,
+    Verdict,
+    identify_bench,
+    published_estimate,
+)
+from valve_friction_ros.model import (
+    BENCH_VALVE,
+    LOW_FRICTION,
+)
+
+SETTINGS = IdentificationSettings(assumed_mass=1.6)  # of the valve file
+PNG = b"\x89PNG\r\n\x1a\n"
+BENCH = ("--method", "bench")
+
+
+@pytest.fixture(scope="session")
+def result(quick_record):
+    return identify_bench(quick_record, BENCH_VALVE, SETTINGS)
+
+
+class TestTable:
+    def test_every_parameter_with_interval_and_verdict(
+        self, call, result, quick_csv, bench_options
+    ):
+        code, out, err = call(quick_csv, *bench_options, *BENCH)
+        assert (code, err) == (0, "")
+        for name, unit in UNITS.items():
+            one = result.parameters[name]
+            published = format(result.estimate.values[name], ".6g")
+            if math.isnan(one.value):
+                assert row_of(out, name) == f"{name} – {unit} not identifiable {published}"
+            else:
+                size = one.half_width
+                digits = f"{size:.0f}" if size >= 100 else f"{size:.2g}"
+                said = f"{one.value:.6g} {digits} {unit} {one.verdict.value} {published}"
+                assert row_of(out, name) == f"{name} {said}"
+        assert "nan" not in out
+
+    def test_fixed_values_have_no_width(self, call, quick_csv, bench_options):
+        options = ["--fix", "spring_constant=2.05e5", "--fix", "mass"]
+        _, out, _ = call(quick_csv, *bench_options, *options)
+        assert row_of(out, "spring_constant") == "spring_constant 205000 N/m fixed 205000"
+        assert row_of(out, "mass") == "mass 1.6 kg fixed 1.6"
+        assert "fixed: given" not in out
+
+    def test_reasons_fit_and_notes(self, call, printed, result, quick_csv, bench_options):
+        answer = printed(quick_csv, *bench_options, *BENCH)
+        words = " ".join(call(quick_csv, *bench_options, *BENCH)[1].split())
+        for name, entry in answer["parameters"].items():
+            if entry["reason"]:
+                assert f"{name} {entry['verdict']}: {entry['reason']}" in words
+        misfit = result.misfit
+        share = f"{100 * misfit.rms / BENCH_VALVE.travel:.2g} % of travel"
+        assert f"fit {100 * misfit.fit:.2f} %: the most probable model's stem is" in words
+        assert f"{misfit.rms * 1e6:.3g} µm rms from the measured stem, {share}; " in words
+        assert f"; {misfit.systematic * 1e6:.3g} µm of it is not noise" in words
+        sweep = answer["evidence"]
+        assert f"threshold δv {sweep['threshold']:.4g} m/s, {sweep['samples']} samples" in words
+        assert "window 31 samples" in words
+        for warning in answer["warnings"]:
+            assert f"note: {warning}" in words
+
+    def test_doubt_of_the_model_is_a_note(self, result, capsys):
+        """And what was not identified leaves a dash, the published value beside it or not."""
+        doubt = "the Karnopp model does not describe this valve: 98 µm [of it] are not noise"
+        friction = Parameter(
+            "coulomb_friction", math.nan, math.nan, math.nan, Verdict.NOT_IDENTIFIABLE, doubt
+        )
+        doubted = dataclasses.replace(
+            result,
+            warnings=(doubt,),
+            parameters={**result.parameters, "coulomb_friction": friction},
+        )
+        print_table(doubted)
+        out = capsys.readouterr().out
+        assert row_of(out, "coulomb_friction") == "coulomb_friction – N not identifiable"
+        words = " ".join(out.split())
+        assert f"coulomb_friction not identifiable: {doubt}" in words
+        assert f"note: {doubt}" in words
+        assert "nan" not in out
+
+
+class TestPlot:
+    def test_a_picture_and_the_numbers(self, call, quick_csv, bench_options, tmp_path):
+        picture = tmp_path / "record.png"
+        code, out, err = call(quick_csv, *bench_options, "--plot", picture, "--json")
+        assert (code, err) == (0, "")
+        assert set(json.loads(out)) >= KEYS
+        assert picture.read_bytes().startswith(PNG)
+        pixels = matplotlib.image.imread(picture)
+        assert min(pixels.shape[:2]) > 500
+        assert np.unique(pixels.reshape(-1, pixels.shape[2]), axis=0).shape[0] > 10  # colours
+
+    def test_of_a_single_threshold(self, call, quick_csv, bench_options, tmp_path):
+        picture = tmp_path / "record.svg"
+        options = ["--fix", "limit_velocity=0.002", "--plot", picture]
+        assert call(quick_csv, *bench_options, *options)[0] == 0
+        assert "<svg" in picture.read_text()
+
+    @pytest.mark.parametrize(
+        ("name", "message"),
+        [
+            ("record.xyz", "the ending is not a picture format; choose .png, .pdf or .svg"),
+            ("no/record.png", "there is no folder"),
+        ],
+    )
+    def test_a_place_it_cannot_go_to(self, call, quick_csv, bench_options, tmp_path, name, message):
+        code, out, err = call(quick_csv, *bench_options, "--plot", tmp_path / name)
+        assert (code, out) == (2, "")
+        assert err.startswith(f"valve_friction identify: {tmp_path / name}: {message}")
+        assert err.count("\n") == 1
+
+
+POSITION_BIAS = 1.13e-3
+FOUR_COLUMNS = ["--position-bias", str(POSITION_BIAS)]
+
+
+def run(*arguments, code="from valve_friction_ros.commands.main import main"):
+    """Run the command as a process of its own; without `code`, as `python -m` does."""
+    module = ["-m", "valve_friction_ros"]
+    how = module if code is None else ["-c", f"import sys; {code}; sys.exit(main())"]
+    return subprocess.run(
+        [sys.executable, *how, "identify", *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+
+
+class TestProcesses:
+    """As typed into a shell."""
+
+    def test_json_of_the_bench_record(self, write_csv, columns_of, square_record, bench_options):
+        """What is asked of noise-free records, and the very numbers of the library."""
+        path = write_csv(columns_of(square_record))
+        done = run(path, *bench_options, *FOUR_COLUMNS, *BENCH, "--json", code=None)
+        assert (done.returncode, done.stderr) == (0, "")
+        answer = json.loads(done.stdout)
+        published = column(answer, "published")
+        for found in (published, values(answer)):
+            for name in ("viscous_friction", "coulomb_friction", "spring_constant"):
+                assert found[name] == pytest.approx(getattr(LOW_FRICTION, name), rel=1e-3)
+        assert published["mass"] == pytest.approx(LOW_FRICTION.mass, rel=0.1)
+        settings = IdentificationSettings(position_bias=POSITION_BIAS)
+        expected = published_estimate(square_record, BENCH_VALVE, settings)
+        assert published.pop("sliding_friction") is None
+        assert published == expected.values
+        assert answer["evidence"]["threshold"] == expected.threshold
+        assert answer["model_describes"] is True
+
+    def test_without_ros(self, quick_csv, bench_options, tmp_path):
+        """Not even a figure needs rclpy, nor the global state of matplotlib."""
+        blocked = (
+            "sys.modules['rclpy'] = sys.modules['matplotlib.pyplot'] = None; "
+            "from valve_friction_ros.commands.main import main"
+        )
+        picture = tmp_path / "record.png"
+        done = run(quick_csv, *bench_options, "--plot", picture, code=blocked)
+        assert (done.returncode, done.stderr) == (0, "")
+        assert "coulomb_friction" in done.stdout
+        assert picture.read_bytes().startswith(PNG)
+
+    def test_one_line_for_a_bad_file(self, tmp_path, bench_options):
+        """Not even a warning of a library stands beside it."""
+        path = tmp_path / "record.csv"
+        path.write_text("time_s,position_m,pressure_pa\n")
+        done = run(path, *bench_options)
+        assert (done.returncode, done.stdout) == (2, "")
+        assert re.fullmatch(r"valve_friction identify: \S+record\.csv: .+\n", done.stderr)
+
+
+class TestJson:
+    def test_the_result_of_the_library(self, printed, quick_csv, result, bench_options):
+        answer = printed(quick_csv, *bench_options, *BENCH)
+        assert set(answer) == KEYS | {"diagnosis", "findings"}
+        assert list(answer["parameters"]) == [*UNITS, "sliding_friction"]
+        assert answer["sliding_speed"] == result.sliding_speed
+        for name, entry in answer["parameters"].items():
+            expected = result.parameters[name]
+            assert entry == {
+                "value": none_for_nan(expected.value),
+                "standard_error": none_for_nan(expected.standard_error),
+                "half_width": none_for_nan(expected.half_width),
+                "interval": [none_for_nan(end) for end in expected.interval],
+                "verdict": expected.verdict.value,
+                "reason": expected.reason,
+                "published": result.estimate.values.get(name),
+                "unit": PARAMETER_UNITS[name],
+            }
+        assert answer["fit"] == result.misfit.fit
+        assert answer["rms"] == result.misfit.rms
+        assert answer["systematic_misfit"] == result.misfit.systematic
+        assert answer["model_describes"] is True
+        assert answer["derivative_window"] == result.derivative_window
+        assert answer["settings"]["derivative_window"] is None
+        assert answer["settings"]["assumed_mass"] == 1.6
+
+    def test_the_published_estimate_beside_it(
+        self, printed, quick_csv, quick_record, bench_options
+    ):
+        answer = printed(quick_csv, *bench_options, *BENCH)
+        expected = published_estimate(quick_record, BENCH_VALVE, SETTINGS)
+        assert column(answer, "published") == {**expected.values, "sliding_friction": None}
+        for key in ("threshold", "samples", "sigma", "r_squared"):
+            assert answer["evidence"][key] == getattr(expected, key)
+        assert answer["evidence"]["published_window"] == 31
+
+    def test_a_number_without_a_verdict_is_never_shown(self, printed, quick_csv, bench_options):
+        """What the record does not tell is null throughout, with the reason beside it."""
+        answer = printed(quick_csv, *bench_options, *BENCH)
+        assert {name for name, value in values(answer).items() if value is None} == {
+            "mass",
+            "static_friction",
+        }
+        for entry in answer["parameters"].values():
+            assert set(entry) == PARAMETER_KEYS
+            numbers = [entry["value"], entry["standard_error"], *entry["interval"]]
+            if entry["verdict"] == "not identifiable":
+                assert numbers == [None] * 4
+                assert entry["reason"]
+            else:
+                assert entry["verdict"] in ("identified", "weak", "fixed")
+                low, high = entry["interval"]
+                assert low < entry["value"] < high
+        mass = answer["parameters"]["mass"]
+        assert mass["reason"].endswith("; 1.6 kg assumed")
+        assert mass["published"] == 1.6  # assumed there as well
+
+    def test_without_a_published_estimate(self, result):
+        """The rest of the answer does not depend on it."""
+        parameters = {
+            name: dataclasses.replace(one, published=math.nan)
+            for name, one in result.parameters.items()
+        }
+        alone = dataclasses.replace(result, parameters=parameters, warnings=("no answer",))
+        answer = as_json(alone)
+        assert set(answer) == KEYS
+        assert set(column(answer, "published").values()) == {None}
+        assert values(answer) == values(as_json(result))
+        assert answer["evidence"]["threshold"] == result.estimate.threshold
+        assert answer["warnings"] == ["no answer"]
+
+    def test_gzipped(self, printed, quick_csv, bench_options):
+        packed = quick_csv.with_name("record.csv.gz")
+        packed.write_bytes(gzip.compress(quick_csv.read_bytes()))
+        assert printed(packed, *bench_options) == printed(quick_csv, *bench_options)
+
+    def test_other_headers(self, printed, quick_csv, write_csv, quick_record, bench_options):
+        path = write_csv(
+            {
+                "note": np.full(len(quick_record), math.nan),
+                "p": quick_record.pressure,
+                "x": quick_record.position,
+                "t": np.round(quick_record.time, 9),
+            },
+            "other.csv",
+        )
+        names = ["--time-column", "t", "--position-column", "x", "--pressure-column", "p"]
+        found, plain = (printed(one, *bench_options, *names[: 6 * (one is path)]) for one in
+                        (path, quick_csv))  # fmt: skip
+        told = found["warnings"].pop(0)
+        assert told.endswith("pressure 'p' in Pa, position 'x' in m")
+        assert found == plain
+
+
+ALL = ("mass=1.542", "viscous_friction=4865", "coulomb_friction=152.7", "spring_constant=2.05e5")
+METHOD = ("--method", "bench")
+
+
+@pytest.mark.parametrize(
+    ("baseline", "level", "fail_on", "code"),
+    [
+        (152.7, "OK", "warn", 0),
+        (100.0, "WARN", "warn", 3),
+        (100.0, "WARN", "error", 0),
+        (50.0, "ERROR", "warn", 3),
+        (50.0, "ERROR", "error", 3),
+        (50.0, "ERROR", None, 0),
+    ],
+)
+def test_the_diagnosis_may_fail_the_command(
+    call, quick_csv, bench_options, baseline, level, fail_on, code
+):
+    options = ["--baseline-coulomb-friction", baseline, *METHOD, "--json"]
+    options += ["--fail-on", fail_on] if fail_on else []
+    found, out, err = call(quick_csv, *bench_options, *options)
+    assert (found, err) == (code, "")
+    assert json.loads(out)["diagnosis"]["level"] == level
+
+
+def test_without_a_baseline_nothing_was_compared(call, quick_csv, bench_options):
+    code, out, err = call(quick_csv, *bench_options, *METHOD, "--fail-on", "warn")
+    assert code == 0
+    assert out.splitlines()[-1].startswith("unknown: no baseline yet; ")
+    assert err == (
+        "valve_friction identify: --fail-on: there is no baseline, so no friction was compared: "
+        "give --baseline-recording or --baseline-coulomb-friction\n"
+    )
+
+
+@pytest.mark.parametrize("method", ["plant", "bench", "published"])
+def test_all_parameters_are_given(call, quick_csv, bench_options, method):
+    """Nothing is left to identify; the model is compared with the record all the same.
+
+    The published method adds an F_s of its own, with which its model may not move at all.
+    """
+    given = [option for one in (*ALL, "spring_preload=231.65") for option in ("--fix", one)]
+    code, out, err = call(quick_csv, *bench_options, *given, "--method", method, "--json")
+    assert (code, err) == (0, "")
+    answer = json.loads(out)
+    assert answer["parameters"]["coulomb_friction"]["verdict"] == "fixed"
+    assert answer["fit"] > 0.99 or method == "published"
+
+
+class TestOptions:
+    def test_fixed_by_value_and_by_name(self, printed, quick_csv, bench_options):
+        answer = printed(
+            quick_csv, *bench_options, "--fix", "spring_constant=2.05e5", "--fix", "mass"
+        )
+        fixed = {name for name, verdict in column(answer, "verdict").items() if verdict == "fixed"}
+        assert fixed == {"spring_constant", "mass"}
+        assert values(answer)["spring_constant"] == 2.05e5
+        assert values(answer)["mass"] == 1.6  # of the valve file
+        assert answer["warnings"] == []
+        for name in fixed:
+            entry = answer["parameters"][name]
+            assert entry["standard_error"] == 0.0
+            assert entry["interval"] == [entry["value"]] * 2
+            assert entry["published"] == entry["value"]
+
+    def test_threshold(self, printed, quick_csv, bench_options):
+        answer = printed(quick_csv, *bench_options, "--fix", "limit_velocity=0.002")
+        assert answer["evidence"]["threshold"] == 0.002
+
+    def test_position_bias(self, printed, quick_csv, bench_options):
+        answer = printed(quick_csv, *bench_options, *FOUR_COLUMNS)
+        found = column(answer, "published")
+        assert found["spring_preload"] == pytest.approx(
+            found["spring_constant"] * POSITION_BIAS, rel=1e-12
+        )
+        assert values(answer) == values(printed(quick_csv, *bench_options))
+
+    def test_window_and_order_are_those_of_the_published_estimate(
+        self, printed, quick_csv, quick_record, bench_options
+    ):
+        answer = printed(quick_csv, *bench_options, *BENCH, "--derivative-window", 15, "--order", 4)
+        settings = IdentificationSettings(derivative_window=15, order=4, assumed_mass=1.6)
+        assert answer["evidence"]["published_window"] == 15
+        assert answer["settings"]["order"] == 4
+        expected = identify_bench(quick_record, BENCH_VALVE, settings)
+        assert column(answer, "published") == {**expected.estimate.values, "sliding_friction": None}
+        assert known(answer) == {
+            name: value for name, value in expected.values.items() if not math.isnan(value)
+        }
+
+    def test_valve(self, printed, quick_csv, bench_options, tmp_path):
+        """Twice the area is twice the force, and so is every parameter; 2 rounds nothing."""
+        path = tmp_path / "valve.yaml"
+        path.write_text("diaphragm_area: 0.089\npressure_reference: 41740.0\n")
+        once = printed(quick_csv, *bench_options, *BENCH, "--fix", "mass=1.6")
+        twice = printed(quick_csv, "--valve", path, *BENCH, "--fix", "mass=3.2")
+        doubled = {name: value and 2 * value for name, value in column(once, "published").items()}
+        assert column(twice, "published") == doubled
+        assert known(twice) == pytest.approx(
+            {name: 2 * value for name, value in known(once).items()}, rel=1e-6
+        )
+
+    def test_what_the_valve_file_states_is_compared(self, call, printed, quick_csv, tmp_path):
+        """Twice the area of the bench valve, with the spring of its data sheet."""
+        path = tmp_path / "valve.yaml"
+        text = "diaphragm_area: 0.089\npressure_reference: 41740.0\nspring_constant: 2.05e5\n"
+        path.write_text(text)
+        answer = printed(quick_csv, "--valve", path)
+        found = answer["evidence"]["contradicted_data"]["spring_constant"]
+        assert (found["cause"], found["stated"]) == ("area scale", 2.05e5)
+        assert found["factor"] == pytest.approx(2.0, rel=1e-2)
+        assert "check diaphragm_area (doubled)" in answer["warnings"][0]
+        assert "identified" not in column(answer, "verdict").values()
+        _, out, _ = call(quick_csv, "--valve", path)
+        assert f"note: {answer['warnings'][0]}" in " ".join(out.split())
+        path.write_text(text.replace("0.089", "0.0445"))
+        fixed = printed(quick_csv, "--valve", path, "--fix", "spring_constant")
+        assert fixed["settings"]["stated"] == {}
+        assert "contradicted_data" not in fixed["evidence"]
+
+    @pytest.mark.parametrize("header", ["force_n", "F [N]"])
+    def test_force(
+        self, printed, write_csv, columns_of, quick_record, quick_csv, bench_options, header
+    ):
+        """The actuator's force in the file, and no valve file: the same sums, the same result."""
+        columns = columns_of(quick_record)
+        pressure = columns.pop("pressure_pa")
+        path = write_csv(columns | {header: BENCH_VALVE.actuator_force(pressure)}, "force.csv")
+        found = printed(path, "--force-column", header, *BENCH, "--fix", "mass=1.6")
+        expected = printed(quick_csv, *bench_options, *BENCH, "--fix", "mass=1.6")
+        assert column(found, "published") == column(expected, "published")
+        assert column(found, "verdict") == column(expected, "verdict")
+        assert known(found) == pytest.approx(known(expected), rel=1e-6)
+        for answer in (found, expected):
+            del answer["settings"]["assumed_mass"]  # of the valve file
+        # How a table of other headers was read is noted.
+        assert [one.partition(":")[0] for one in found.pop("warnings")] in ([], ["read as"])
+        del expected["warnings"]
+        assert found["sliding_speed"] == pytest.approx(expected["sliding_speed"], rel=1e-9)
+        close = ("parameters", "evidence", "fit", "rms", "systematic_misfit", "sliding_speed")
+        first_survey = ("diagnosis", "findings")  # by the travel, which the valve file tells
+        assert [expected.pop(one, None) is not None for one in first_survey] == [True, True]
+        assert {key: found[key] for key in found if key not in close} == {
+            key: expected[key] for key in expected if key not in close
+        }
+
+    def test_help_names_all(self, call, capsys):
+        with pytest.raises(SystemExit) as ended:
+            call("--help")
+        assert ended.value.code == 0
+        options = set(re.findall(r"--[a-z-]+", capsys.readouterr().out))
+        columns = {f"--{name}-column" for name in ("time", "position", "pressure", "force")}
+        method = {"--method", "--fix", "--position-bias", "--derivative-window", "--order"}
+        assert options >= columns | method | {"--valve", "--plot", "--report", "--json"}
