@@ -26,8 +26,7 @@ from valve_friction_ros.nodes.plumbing.output_folder import (
     valve_name,
 )
 from valve_friction_ros.nodes.plumbing.worker import done_in
-from valve_friction_ros.records.bags.storage import bag_libraries
-from valve_friction_ros.records.bags.topics import StreamNames
+from valve_friction_ros.records.bags.topics import StreamNames, bag_libraries
 from valve_friction_ros.settings import IDENTIFICATION
 from valve_friction_ros.streams import Snapshot
 

@@ -19,7 +19,7 @@ from pathlib import Path
 from rclpy.node import Node
 
 from valve_friction_ros.identification import RefusalError
-from valve_friction_ros.records.data_folder import data_folder
+from valve_friction_ros.records.files import data_folder
 from valve_friction_ros.streams import utc
 
 _BLOCK = 4096
