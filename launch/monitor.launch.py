@@ -32,7 +32,7 @@ from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.substitutions import FindPackageShare
 
-from valve_friction_ros.records.spelling import nearest, resembling
+from valve_friction_ros.outside_text import nearest, resembling
 
 PACKAGE = "valve_friction_ros"
 NAMESPACE = re.compile(r"/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)

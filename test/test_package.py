@@ -133,7 +133,7 @@ def test_manifest_names_every_message_package_and_library():
         elif module in CLUSTER_LIBRARIES:
             assert path == PROJECT / NAME / "fleet" / "cluster.py"
         elif module == "upath":
-            assert path == PROJECT / NAME / "records" / "stores.py"
+            assert path == PROJECT / NAME / "records" / "files.py"
         else:
             assert LIBRARIES.get(module, (module,))[0] in declared, f"{path.name}: {module}"
 
@@ -230,7 +230,7 @@ def test_the_newest_versions_are_those_that_are_installed():
 
 def test_the_remedy_is_the_extra():
     bags = requirements("extras_require")["bags"]
-    text = (PROJECT / NAME / "records" / "bags" / "storage.py").read_text()
+    text = (PROJECT / NAME / "records" / "bags" / "topics.py").read_text()
     remedy = re.search(r"pip install ([^`]+)`", text)[1]
     assert sorted(word.strip("'") for word in remedy.split()) == sorted(bags)
     assert f"pip install {remedy}" in TEXT

@@ -7,8 +7,12 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Text from files, topics and tags, made harmless where it is shown."""
+"""Text from outside: made harmless where it is shown; names that nobody knows, and the nearest."""
 
+import csv
+import difflib
+import io
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 _LONGEST = 10_000
@@ -33,6 +37,40 @@ def harmless(cell: Any) -> Any:
     return f"'{cell}" if isinstance(cell, str) and _is_formula(cell) else cell
 
 
+def csv_text(header: Sequence[str], rows: Iterable[Mapping[str, Any]]) -> str:
+    """Return rows as CSV, their cells harmless; one that a row does not have is empty."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(header)
+    writer.writerows([harmless(row.get(name)) for name in header] for row in rows)
+    return text.getvalue()
+
+
 def as_read(cell: str) -> str:
     """Return the text that `harmless` was given."""
     return cell[1:] if cell.startswith("'") and _is_formula(cell) else cell
+
+
+_MOST_NAMED = 12
+"""Names in a message. Chosen: it stays readable."""
+
+_RESEMBLES = 0.8
+"""Likeness (difflib) of a misspelled name. Chosen: two letters of ten may differ."""
+
+
+def resembling(name: str, known: Iterable[str]) -> list[str]:
+    """Return the known name that a misspelled one resembles, if there is one."""
+    return difflib.get_close_matches(name, known, n=1, cutoff=_RESEMBLES)
+
+
+def nearest(name: object, known: Iterable[str]) -> str:
+    """Return the end of a message about an unknown name: the nearest known one, or all of few."""
+    names = list(known)
+    text = str(name)[:100]
+    close = difflib.get_close_matches(text, names, n=1)
+    if not close:  # such as position for position_column
+        close = [each for each in names if text and text in each.split("_")][:1]
+    if close:
+        return f"did you mean {close[0]!r}?"
+    more = ", …" if len(names) > _MOST_NAMED else ""
+    return f"known are {', '.join(names[:_MOST_NAMED])}{more}"

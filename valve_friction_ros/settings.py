@@ -38,7 +38,7 @@ from valve_friction_ros.identification.settings import (
     current_name,
 )
 from valve_friction_ros.identification.units import UNITS
-from valve_friction_ros.records.data_folder import history_file
+from valve_friction_ros.records.files import history_file
 
 ALARM_KINDS = (
     "friction_high",

@@ -26,7 +26,7 @@ from valve_friction_ros.commands.arguments.declared import PAGE
 from valve_friction_ros.commands.console import OutputConsole
 from valve_friction_ros.commands.process import ExitCode
 from valve_friction_ros.model import SensorNoise
-from valve_friction_ros.records.whole_file import write_whole
+from valve_friction_ros.records.files import write_whole
 from valve_friction_ros.reports import write_report
 
 _PLAN = Plan()

@@ -21,7 +21,7 @@ from documentation import PROJECT
 
 from valve_friction_ros.commands import identify_folder
 from valve_friction_ros.fleet import find_recordings
-from valve_friction_ros.records.stores import on_disk, place
+from valve_friction_ros.records.files import on_disk, place
 
 fsspec = pytest.importorskip("fsspec", reason="run `make venv-cluster`")
 pytest.importorskip("upath", reason="run `make venv-cluster`")

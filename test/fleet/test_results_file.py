@@ -24,24 +24,21 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from valve_friction_ros.fleet import (
-    COLUMNS,
-    ResultsFile,
-    database_of,
-    error_cells,
-    key_cells,
-    ranked,
-    with_reports_written,
-)
-from valve_friction_ros.fleet.results_file import page_text
+from valve_friction_ros.fleet import ResultsFile
+from valve_friction_ros.fleet.results_file import database_of, page_text
 from valve_friction_ros.fleet.rows import (
+    COLUMNS,
     HEIGHT,
     PAGE,
     WIDTH,
+    error_cells,
+    key_cells,
+    ranked,
     reaches,
     report_name,
     signature_points,
     status_of,
+    with_reports_written,
 )
 from valve_friction_ros.health import Level
 from valve_friction_ros.model import Recording

@@ -12,7 +12,7 @@
 import pytest
 from live_nodes import Domain, NodeProcess, values_of
 
-from valve_friction_ros.records.data_folder import data_folder
+from valve_friction_ros.records.files import data_folder
 
 
 def end_of(domain, folder, name, **parameters):

@@ -34,8 +34,8 @@ from bags import (
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.model import BENCH_VALVE, Recording, Valve
 from valve_friction_ros.records.bags.topics import TopicChoice
+from valve_friction_ros.records.recorded_valve import Stretch
 from valve_friction_ros.records.recordings import ReadingOptions, holds_force, read_recordings
-from valve_friction_ros.records.stretch import Stretch
 from valve_friction_ros.streams import RecordBuffer
 
 zstd = pytest.importorskip("backports.zstd")

@@ -20,8 +20,8 @@ import pytest
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.model import BENCH_VALVE, Drive, Valve
 from valve_friction_ros.records.columns import Columns
+from valve_friction_ros.records.recorded_valve import Stretch
 from valve_friction_ros.records.recordings import holds_a_force, read_table
-from valve_friction_ros.records.stretch import Stretch
 from valve_friction_ros.records.table import read_columns
 
 HEADER = "time_s,position_m,pressure_pa"

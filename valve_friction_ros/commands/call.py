@@ -15,7 +15,7 @@ import sys
 
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-from valve_friction_ros.commands.arguments.fail_on import has_failed
+from valve_friction_ros.commands.arguments.identification import has_failed
 from valve_friction_ros.commands.console import OutputConsole
 from valve_friction_ros.commands.process import ExitCode, StopSignals, complain
 from valve_friction_ros.identification import RefusalError

@@ -16,18 +16,20 @@ from typing import Any
 
 import yaml
 
-from valve_friction_ros.commands.arguments.actuator_questions import QUESTIONS, ActuatorQuestion
 from valve_friction_ros.commands.arguments.recording import given_columns
 from valve_friction_ros.commands.process import ExitCode
-from valve_friction_ros.records.valve_description import ActuatorData
+from valve_friction_ros.records.files import write_whole
+from valve_friction_ros.records.valve_description import (
+    QUESTIONS,
+    ActuatorQuestion,
+    valve_description,
+)
 from valve_friction_ros.records.valve_file import valve_file_of
-from valve_friction_ros.records.whole_file import write_whole
 
 REFUSALS = ()
 
 
 def _asked(question: ActuatorQuestion) -> Any:
-    """Ask until there is an answer that can be read."""
     default = f" [{question.default or 'none'}]" if question.default is not None else ""
     wrong: ValueError | None = None
     while True:
@@ -80,24 +82,11 @@ def run(options: argparse.Namespace) -> int:
     if output is not None and output.exists() and not options.replace:
         raise ValueError(f"{output}: it is there: give another name, or --replace")
     answers = _answers(options)
-    is_double = answers["acting"] == "double"
-    if answers["opposing_area"] is not None and not is_double:
+    if answers["opposing_area"] is not None and answers["acting"] != "double":
         raise ValueError("--opposing-area is of a double-acting actuator: give --acting double")
-    data = ActuatorData(
-        area=answers["area"],
-        travel=answers["travel"],
-        spring_range=answers["spring_range"],
-        is_absolute=answers["sensor"] == "absolute",
-        sensor_range=answers["sensor_range"],
-        is_air_to_close=answers["air_to"] == "close",
-        position_is_opening=answers["position"] == "plug",
-        opposing_area=(answers["opposing_area"] or answers["area"]) if is_double else None,
-        opposing_area_is_assumed=answers["opposing_area"] is None,
-        mass=answers["mass"],
-        tag=answers["tag"] or "",
-        columns=given_columns(options),
-    )
-    text = data.text()
+    if answers["opposing_area"] == 0:
+        answers["opposing_area"] = answers["area"]
+    text = valve_description(answers, given_columns(options))
     valve_file_of(yaml.safe_load(text), output or Path("the description"))
     if output is None:
         print(text, end="")

@@ -10,8 +10,6 @@
 """Sub-command `history`: list, export and draw what the identifiers have kept."""
 
 import argparse
-import csv
-import io
 import json
 import time
 from collections.abc import Sequence
@@ -21,8 +19,7 @@ from typing import Any
 from rich.table import Table
 
 from valve_friction_ros.commands.arguments.declared import EARLIEST, LATEST
-from valve_friction_ros.commands.arguments.fail_on import has_failed
-from valve_friction_ros.commands.arguments.kept_valves import chosen_valves
+from valve_friction_ros.commands.arguments.identification import chosen_valves, has_failed
 from valve_friction_ros.commands.console import plain_console
 from valve_friction_ros.commands.process import ExitCode
 from valve_friction_ros.health import FrictionState
@@ -44,8 +41,8 @@ from valve_friction_ros.identification import (
     parameter_mapping,
     plain,
 )
-from valve_friction_ros.outside_text import harmless, printable
-from valve_friction_ros.records.whole_file import write_whole
+from valve_friction_ros.outside_text import csv_text, printable
+from valve_friction_ros.records.files import write_whole
 from valve_friction_ros.response import ResponseSummary
 from valve_friction_ros.streams import DAY, nanoseconds, utc, utc_day, utc_second
 from valve_friction_ros.usage import BINS, Usage, UsedDay, ValveUsage
@@ -79,11 +76,6 @@ def _usage_as_json(usage: ValveUsage) -> dict[str, Any] | None:
     return shown
 
 
-def alarms_as_json(alarms: Sequence[AlarmRecording]) -> list[dict[str, Any]]:
-    """Return the recordings of alarms as mappings, with their times as text."""
-    return [{**one.to_dict(), "time": utc_second(one.time)} for one in alarms]
-
-
 def service_lines(
     usage: ValveUsage,
     alarms: Sequence[AlarmRecording] = (),
@@ -108,7 +100,6 @@ def service_lines(
 
 
 def _answers(response: ResponseSummary) -> str:
-    """Return the medians of the answers."""
     seconds = (("dead time", "dead_time"), ("T63", "t63"), ("T86", "t86"))
     shares = (("overshoot", "overshoot"), ("steady error", "steady_error"))
     figures = [
@@ -182,13 +173,8 @@ def _write_usage(path: Path, valves: Sequence[tuple[KeptValve, ValveUsage]]) -> 
     Raises OSError if it cannot be written; it names `path`, and no part of the table stays.
     """
     rows = [_usage_row(valve, one) for valve, usage in valves for one in usage.days]
-    text = io.StringIO()
-    writer = csv.DictWriter(
-        text, _usage_row(KeptValve("", ""), UsedDay(0, 0, Usage())), lineterminator="\n"
-    )
-    writer.writeheader()
-    writer.writerows({name: harmless(value) for name, value in row.items()} for row in rows)
-    write_whole(path, text.getvalue().encode())
+    header = list(_usage_row(KeptValve("", ""), UsedDay(0, 0, Usage())))
+    write_whole(path, csv_text(header, rows).encode())
 
 
 def _usage_row(valve: KeptValve, one: UsedDay) -> dict[str, object]:
@@ -220,32 +206,27 @@ def _trend_as_json(trend: Trend | None) -> dict[str, Any] | None:
     """Return the trend; the numbers only where the drift is significant."""
     if trend is None:
         return None
-    told: dict[str, Any] = {
+    is_sure, crossing = trend.is_significant, trend.crossing
+    return {
         "begin": time_text(trend.begin),
         "end": time_text(trend.end),
         "days": trend.days,
         "outliers": trend.outliers,
         "of": trend.of,
         "speed": plain(trend.speed),
-        "significant": trend.is_significant,
-        "drift_n_per_month": None,
-        "half_width_n_per_month": None,
-        "crossing": None,
+        "significant": is_sure,
+        "drift_n_per_month": trend.drift if is_sure else None,
+        "half_width_n_per_month": trend.half_width if is_sure else None,
+        "crossing": None
+        if crossing is None
+        else {
+            "limit": crossing.limit.value,
+            "level_n": crossing.level,
+            "expected": time_text(crossing.time),
+            "earliest": time_text(crossing.earliest),
+            "latest": time_text(crossing.latest),
+        },
     }
-    if trend.is_significant:
-        told |= {
-            "drift_n_per_month": trend.drift,
-            "half_width_n_per_month": trend.half_width,
-        }
-    if trend.crossing is not None:
-        told["crossing"] = {
-            "limit": trend.crossing.limit.value,
-            "level_n": trend.crossing.level,
-            "expected": time_text(trend.crossing.time),
-            "earliest": time_text(trend.crossing.earliest),
-            "latest": time_text(trend.crossing.latest),
-        }
-    return told
 
 
 def _shown(entry: HistoryEntry | KeptBaseline) -> dict[str, Any]:
@@ -266,7 +247,9 @@ def _as_json(histories: Sequence[ValveHistory]) -> dict[str, Any]:
                 "trend": _trend_as_json(history.trend),
                 "baselines": [_shown(kept) for kept in history.baselines],
                 "usage": _usage_as_json(history.usage),
-                "alarm_recordings": alarms_as_json(history.alarms),
+                "alarm_recordings": [
+                    one.to_dict() | {"time": utc_second(one.time)} for one in history.alarms
+                ],
                 "response": history.response.to_dict(),
                 "entries": [_shown(entry) for entry in history.entries],
             }
@@ -316,11 +299,7 @@ def _write_csv(path: Path, histories: Sequence[ValveHistory]) -> None:
     rows = [_row(entry) for entry in entries]
     widest = max(rows, key=len)
     header = [*dict.fromkeys([*widest, *(name for row in rows for name in row)])]
-    text = io.StringIO()
-    writer = csv.DictWriter(text, header, lineterminator="\n")
-    writer.writeheader()
-    writer.writerows({name: harmless(value) for name, value in row.items()} for row in rows)
-    write_whole(path, text.getvalue().encode())
+    write_whole(path, csv_text(header, rows).encode())
 
 
 def _told(entry: HistoryEntry) -> str:
@@ -417,7 +396,6 @@ def _require_files(options: argparse.Namespace) -> None:
 
 
 def _usages(options: argparse.Namespace) -> list[tuple[KeptValve, ValveUsage]]:
-    """Read the usage of the chosen valves, on the chosen days."""
     if options.plot is not None or options.fail_on is not None:
         raise ValueError("--usage: neither --plot nor --fail-on belong to it")
     file, found = History(options.file), []
@@ -454,25 +432,16 @@ def _span(options: argparse.Namespace) -> tuple[int, int]:
     return nanoseconds(since.total_seconds()), nanoseconds(until.total_seconds())
 
 
-def _histories(options: argparse.Namespace) -> tuple[ValveHistory, ...]:
-    """Read the chosen valves within the chosen times."""
-    file = History(options.file)
-    histories = valve_histories(
-        file,
-        chosen_valves(file.valves(), options.valve, "--valve"),
-        *_span(options),
-    )
-    if not histories:
-        raise ValueError(f"{options.file}: no identification of these valves within these times")
-    return histories
-
-
 def run(options: argparse.Namespace) -> int:
     """Print what was kept of the chosen valves, and write the files asked for."""
     _require_files(options)
     if options.usage:
         return _print_usages(options)
-    histories = _histories(options)
+    file = History(options.file)
+    valves = chosen_valves(file.valves(), options.valve, "--valve")
+    histories = valve_histories(file, valves, *_span(options))
+    if not histories:
+        raise ValueError(f"{options.file}: no identification of these valves within these times")
     figure = None
     if options.plot is not None:
         from valve_friction_ros import figures  # noqa: PLC0415 - slow to import

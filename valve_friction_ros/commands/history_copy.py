@@ -12,7 +12,7 @@
 import argparse
 import json
 
-from valve_friction_ros.commands.arguments.kept_valves import chosen_valves
+from valve_friction_ros.commands.arguments.identification import chosen_valves
 from valve_friction_ros.commands.process import ExitCode
 from valve_friction_ros.history import CopiedPart, History, HistoryError, copied
 

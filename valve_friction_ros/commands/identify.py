@@ -17,8 +17,8 @@ from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from valve_friction_ros.commands.arguments.fail_on import has_failed
 from valve_friction_ros.commands.arguments.identification import (
+    has_failed,
     identification_settings,
     method_name,
     survey_limits,
@@ -49,9 +49,8 @@ from valve_friction_ros.identification import (
 )
 from valve_friction_ros.model import Recording, Valve
 from valve_friction_ros.outside_text import printable
-from valve_friction_ros.records.recorded_valve import RecordedValve
-from valve_friction_ros.records.recordings import read_recordings
-from valve_friction_ros.records.stretch import Stretch
+from valve_friction_ros.records.recorded_valve import RecordedValve, Stretch
+from valve_friction_ros.records.recordings import ReadingOptions, read_recordings
 from valve_friction_ros.wording import in_zone
 
 
@@ -107,80 +106,8 @@ def baseline_from(options: argparse.Namespace) -> Baseline | None:
     return Baseline(friction, 0.0 if width is None else width)
 
 
-class IdentificationFiles(NamedTuple):
-    """The files to write; their times are those of `zone`, an IANA name, or UTC."""
-
-    plot: Path | None
-    report: Path | None
-    zone: str = ""
-    healthy: Recording | None = None
-
-    def compared_with(
-        self, recorded: RecordedValve, outcome: Result | RefusalError
-    ) -> tuple[Baseline, "IdentificationFiles"]:
-        """Return the frictions of the healthy valve, and the files with its record in them.
-
-        Raises RefusalError, which names its file, where it cannot be a baseline.
-        """
-        if isinstance(outcome, RefusalError):
-            raise outcome
-        try:
-            return Baseline.of(outcome), self._replace(healthy=outcome.recording)
-        except RefusalError as refusal:
-            raise recorded.refused(refusal) from None
-
-    def require_one_valve(self, recorded: Sequence[RecordedValve]) -> None:
-        """Refuse several valves; raises ValueError, which names them."""
-        if self.plot is not None:
-            require_one(recorded, "--plot draws")
-        if self.report is not None:
-            require_one(recorded, "--report is of")
-
-    def write(
-        self,
-        recorded: RecordedValve,
-        result: Result,
-        baseline: Baseline | None,
-        limits: FrictionLimits,
-    ) -> None:
-        """Write them; raises OSError, which names the file, where that fails."""
-        if self.plot is None and self.report is None:
-            return
-
-        from valve_friction_ros import figures  # noqa: PLC0415 - slow to import
-
-        if self.plot is not None:
-            figures.save_picture(figures.identification_figure(result), self.plot)
-        if self.report is not None:
-            from valve_friction_ros import reports  # noqa: PLC0415 - slow to import
-
-            record = reports.IdentifiedRecord(
-                name=recorded.name.strip("/") or recorded.path.name,
-                source=recorded.label,
-                result=result,
-                baseline=baseline,
-                notes=recorded.notes,
-                limits=limits,
-                dated=_dated(recorded.path, self.zone),
-                zone=self.zone,
-                healthy=self.healthy,
-            )
-            reports.write_report(reports.identification_report(record), self.report)
-
-
-def _dated(path: Path, zone: str) -> str:
-    """Return when a file was last changed, in words; empty where it has no such time."""
-    if not path.is_file():
-        return ""
-    changed = datetime.fromtimestamp(path.stat().st_mtime, timezone.utc)
-    return f"its file was last changed {in_zone(changed, zone)}"
-
-
-def identification_files(options: argparse.Namespace, zone: str) -> IdentificationFiles:
-    """Return the files that were asked for, with times in a zone.
-
-    Raises ValueError, which names the file and the cause, for a file that cannot be written.
-    """
+def _require_files(options: argparse.Namespace) -> None:
+    """Refuse files that cannot be written; the ValueError names the file and the cause."""
     if options.plot is not None:
         from valve_friction_ros.figures import require_picture_file  # noqa: PLC0415 - slow to import
 
@@ -189,7 +116,14 @@ def identification_files(options: argparse.Namespace, zone: str) -> Identificati
         from valve_friction_ros.reports import require_report_file  # noqa: PLC0415 - slow to import
 
         require_report_file(options.report)
-    return IdentificationFiles(options.plot, options.report, zone)
+
+
+def _dated(path: Path, zone: str) -> str:
+    """Return when a file was last changed, in words; empty where it has no such time."""
+    if not path.is_file():
+        return ""
+    changed = datetime.fromtimestamp(path.stat().st_mtime, timezone.utc)
+    return f"its file was last changed {in_zone(changed, zone)}"
 
 
 REFUSALS = (RefusalError,)
@@ -225,6 +159,58 @@ def _identified(
         return identify(recording, valve, settings)
     except RefusalError as refusal:
         return recorded.refused(refusal)
+
+
+def _of_healthy(
+    options: argparse.Namespace,
+    valve: Valve,
+    identify: Method,
+    settings: IdentificationSettings,
+    reading: ReadingOptions,
+) -> tuple[Baseline, Recording]:
+    """Return the frictions of the healthy valve, and its record.
+
+    Raises RefusalError, which names its file, where it cannot be a baseline.
+    """
+    recorded = read_one(options.baseline_recording, valve, replace(reading, stretch=Stretch()))
+    outcome = _identified(recorded, valve, identify, settings)
+    if isinstance(outcome, RefusalError):
+        raise outcome
+    try:
+        return Baseline.of(outcome), outcome.recording
+    except RefusalError as refusal:
+        raise recorded.refused(refusal) from None
+
+
+def _write_files(
+    options: argparse.Namespace,
+    recorded: RecordedValve,
+    result: Result,
+    baseline: Baseline | None,
+    healthy: Recording | None,
+    limits: FrictionLimits,
+    zone: str,
+) -> None:
+    """Write what was asked for, with times in a zone; the OSError of a failure names the file."""
+    if options.plot is not None:
+        from valve_friction_ros import figures  # noqa: PLC0415 - slow to import
+
+        figures.save_picture(figures.identification_figure(result), options.plot)
+    if options.report is not None:
+        from valve_friction_ros import reports  # noqa: PLC0415 - slow to import
+
+        record = reports.IdentifiedRecord(
+            name=recorded.name.strip("/") or recorded.path.name,
+            source=recorded.label,
+            result=result,
+            baseline=baseline,
+            notes=recorded.notes,
+            limits=limits,
+            dated=_dated(recorded.path, zone),
+            zone=zone,
+            healthy=healthy,
+        )
+        reports.write_report(reports.identification_report(record), options.report)
 
 
 def _print_json(results: Sequence[_Answer]) -> None:
@@ -272,20 +258,21 @@ def run(options: argparse.Namespace) -> int:
     limits = survey_limits(options, description)
     method = method_named(method_name(options, description.settings))
     baseline = baseline_from(options)
-    files = identification_files(options, reading.columns.time_zone)
+    _require_files(options)
+    healthy: Recording | None = None
     if options.baseline_recording is not None:
-        whole = replace(reading, stretch=Stretch())
-        healthy = read_one(options.baseline_recording, valve, whole)
-        baseline, files = files.compared_with(
-            healthy, _identified(healthy, valve, method, settings)
-        )
+        baseline, healthy = _of_healthy(options, valve, method, settings, reading)
     with reading_progress():
         recorded = read_recordings(options.file, valve, reading)
     save_columns(options, reading)
-    files.require_one_valve(recorded)
-    if baseline is not None:
-        name = "coulomb-friction" if options.baseline_recording is None else "recording"
-        require_one(recorded, f"--baseline-{name} is of")
+    given = "coulomb-friction" if healthy is None else "recording"
+    for of_one, purpose in (
+        (options.plot, "--plot draws"),
+        (options.report, "--report is of"),
+        (baseline, f"--baseline-{given} is of"),
+    ):
+        if of_one is not None:
+            require_one(recorded, purpose)
     results = []
     for each in recorded:
         outcome = _identified(each, valve, method, settings)
@@ -302,7 +289,8 @@ def run(options: argparse.Namespace) -> int:
     finally:  # a closed output costs no picture, and a full disk no numbers
         for each, outcome, _, _ in results:
             if isinstance(outcome, Result):
-                files.write(each, outcome, baseline, limits)
+                zone = reading.columns.time_zone
+                _write_files(options, each, outcome, baseline, healthy, limits, zone)
     if options.fail_on is not None and baseline is None:
         complain(
             options.command,

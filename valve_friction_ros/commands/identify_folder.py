@@ -21,8 +21,8 @@ from typing import Any
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
-from valve_friction_ros.commands.arguments.fail_on import has_failed
 from valve_friction_ros.commands.arguments.identification import (
+    has_failed,
     identification_settings,
     method_name,
     survey_limits,
@@ -30,53 +30,55 @@ from valve_friction_ros.commands.arguments.identification import (
 from valve_friction_ros.commands.arguments.recording import described, reading_options
 from valve_friction_ros.commands.console import OutputConsole
 from valve_friction_ros.commands.process import ExitCode, StopSignals, complain
-from valve_friction_ros.fleet import (
+from valve_friction_ros.fleet.cluster import cluster_at, in_cluster
+from valve_friction_ros.fleet.job import (
     FILING,
-    REFUSED,
-    Baselines,
-    DeadWorker,
     Filing,
-    Findings,
-    FoundRecording,
     Job,
     Options,
+    baseline_kept,
+    file_results,
+    filed_before,
+    identify_job,
+    identify_job_elsewhere,
+)
+from valve_friction_ros.fleet.plant import read_plant, valves_of
+from valve_friction_ros.fleet.processes import DeadWorker, in_processes, usable_cores
+from valve_friction_ros.fleet.recordings import (
+    Baselines,
+    Findings,
+    FoundRecording,
+    find_recordings,
+    read_baselines,
+)
+from valve_friction_ros.fleet.results_file import (
+    REFUSED,
     RecordingRows,
     ResultsFile,
     Tally,
-    baseline_kept,
-    cluster_at,
     database_of,
-    error_cells,
-    file_results,
-    filed_before,
-    find_recordings,
-    identify_job,
-    identify_job_elsewhere,
-    in_cluster,
-    in_processes,
     is_page,
-    key_cells,
-    ranked,
-    reaches,
-    read_baselines,
-    read_plant,
     reason_of,
     reports_of,
     tally,
-    usable_cores,
-    valves_of,
-    with_reports_written,
     writer_of,
 )
-from valve_friction_ros.fleet.rows import Cell
-from valve_friction_ros.health import Baseline, Level
+from valve_friction_ros.fleet.rows import (
+    Cell,
+    error_cells,
+    key_cells,
+    ranked,
+    reaches,
+    with_reports_written,
+)
+from valve_friction_ros.health import Level
 from valve_friction_ros.history import HistoryError
 from valve_friction_ros.identification import FIXABLE
 from valve_friction_ros.model import Valve
 from valve_friction_ros.model.checks import frozen
-from valve_friction_ros.records.bags.storage import is_bag
+from valve_friction_ros.records.bags.topics import is_bag
+from valve_friction_ros.records.files import explained, on_disk, place
 from valve_friction_ros.records.recordings import ReadingOptions
-from valve_friction_ros.records.stores import explained, on_disk, place
 from valve_friction_ros.records.valve_file import ValveFile, read_valve_file
 from valve_friction_ros.streams import utc_second
 
@@ -105,11 +107,6 @@ def _valve_file(found: FoundRecording, common: Path | None) -> Path | None:
     return next((place for place in places if place.exists()), common)
 
 
-def _kept_baselines(history: Path | None) -> Callable[[str], Baseline | None]:
-    """Return what reads the baseline of a tag from a history, once each."""
-    return cache(lambda tag: None if history is None else baseline_kept(history, tag))
-
-
 def make_plan(
     findings: Findings,
     options: argparse.Namespace,
@@ -121,7 +118,7 @@ def make_plan(
     A table with several valves of the plant is as many recordings.
     """
     plant = {} if options.plant is None else read_plant(options.plant)
-    kept_baseline = _kept_baselines(options.history)
+    kept_baseline = cache(partial(baseline_kept, options.history))
 
     @cache
     def described_by(valve_file: Path) -> tuple[ValveFile, ReadingOptions]:
@@ -177,10 +174,6 @@ def make_plan(
         yield from plans(found)
 
 
-def _is_current(entry: RecordingRows, plan: Plan) -> bool:
-    return (entry.content, entry.settings) == (plan.content, plan.settings)
-
-
 def _has_reports(entry: RecordingRows, plan: Plan) -> bool:
     """Return whether the reports of an entry are there, if they are wanted."""
     if not isinstance(plan.job, Job) or plan.job.reports is None:
@@ -227,7 +220,7 @@ def forget_stale(
         plan = plans.get(entry.recording)
         if plan is None:
             continue
-        if _is_current(entry, plan):
+        if (entry.content, entry.settings) == (plan.content, plan.settings):
             is_whole = _has_reports(entry, plan) and _is_filed(entry, filed)
             if is_whole and not (options.retry_failed and entry.failed):
                 done.add(entry.recording)
@@ -287,8 +280,7 @@ def finished(
             yield by_job[job.name], with_reports_written(answer, job.reports.parent)
 
 
-_SHOWN_REASONS = 10
-_SHOWN_ALARMS = 10
+_SHOWN_REASONS = _SHOWN_ALARMS = _SHOWN_SKIPPED = 10
 _BAD = ("bad", "watch")
 """What a first survey says of valves that need attention."""
 
@@ -301,14 +293,11 @@ def print_tally(counted: Tally) -> None:
     for outcome, count in sorted(counted.outcomes.items(), key=lambda one: one[0] == REFUSED):
         table.add_row(outcome, str(count))
     console.print(table)
-    reasons = counted.reasons()
-    for reason in reasons[:_SHOWN_REASONS]:
-        console.print(
-            f"{reason.count:>6} refused: {reason.text} (for example {reason.example})",
-            soft_wrap=True,
-        )
-    if len(reasons) > _SHOWN_REASONS:
-        console.print(f"       and for {len(reasons) - _SHOWN_REASONS} more reasons")
+    for reason, names in [*counted.reasons.items()][:_SHOWN_REASONS]:
+        told = f"{len(names):>6} refused: {reason} (for example {names[0]})"
+        console.print(told, soft_wrap=True)
+    if len(counted.reasons) > _SHOWN_REASONS:
+        console.print(f"       and for {len(counted.reasons) - _SHOWN_REASONS} more reasons")
 
 
 def print_alarms(rows: Iterable[Mapping[str, Cell]]) -> None:
@@ -326,7 +315,6 @@ def print_alarms(rows: Iterable[Mapping[str, Cell]]) -> None:
 
 
 REFUSALS = (HistoryError,)
-_SHOWN_SKIPPED = 10
 
 
 def _require_sense(options: argparse.Namespace) -> None:

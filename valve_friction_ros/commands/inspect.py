@@ -11,8 +11,12 @@
 
 import argparse
 import json
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
 from rich.table import Table
 
 from valve_friction_ros.commands.arguments.recording import (
@@ -27,49 +31,105 @@ from valve_friction_ros.commands.console import plain_console
 from valve_friction_ros.commands.process import ExitCode, complain
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.outside_text import printable
-from valve_friction_ros.records.inspection import InspectedSignal, Inspection, inspected
+from valve_friction_ros.records.layout import Layout
+from valve_friction_ros.records.table import OpenTable, ReadSignal
 from valve_friction_ros.streams import utc_second
 
 REFUSALS = (RefusalError,)
 _DATED = 946_684_800_000_000_000
 """Time, ns since 1970, from which a stamp is a date: the year 2000."""
+_GAP = 10
+"""Sampling periods above which a pause is a gap."""
+_BARS = "▁▂▃▄▅▆▇█"
+_PARTS = 60
+"""Parts of the time in the picture of a signal."""
 
 
-def _cells(one: InspectedSignal) -> tuple[str, ...]:
-    rate = f"{one.period:.4g} s" if one.samples > 1 else "–"
-    gaps = f"{one.gaps}, longest {one.longest:.3g} s" if one.gaps else "none"
+def _inspected(valve: str, read: ReadSignal) -> dict[str, Any]:
+    """Describe a signal as it was read: times in s, values in its unit, begin in ns since 1970."""
+    steps = np.diff(read.stamps) / 1e9
+    period = float(np.median(steps)) if steps.size else np.nan
+    return {
+        "valve": valve,
+        "quantity": read.signal.quantity,
+        "name": read.signal.name,
+        "unit": read.signal.unit,
+        "samples": read.values.size,
+        "bad": read.bad.total(),
+        "period": period,
+        "low": float(np.min(read.values, initial=np.inf)),
+        "high": float(np.max(read.values, initial=-np.inf)),
+        "gaps": int((steps > _GAP * period).sum()),
+        "longest": float(np.max(steps, initial=0.0)),
+        "begin": int(read.stamps[0]) if read.stamps.size else 0,
+    }
+
+
+def _as_json(one: Mapping[str, Any]) -> dict[str, Any]:
+    return {
+        name: None if isinstance(value, float) and not np.isfinite(value) else value
+        for name, value in one.items()
+    }
+
+
+def _cells(one: Mapping[str, Any]) -> tuple[str, ...]:
     return (
-        printable(one.valve),
-        one.quantity,
-        printable(one.name),
-        "%" if one.unit == "percent" else one.unit,
-        str(one.samples),
-        rate,
-        f"{one.low:.6g} … {one.high:.6g}" if one.samples else "–",
-        gaps,
-        str(one.bad),
+        printable(one["valve"]),
+        one["quantity"],
+        printable(one["name"]),
+        "%" if one["unit"] == "percent" else one["unit"],
+        str(one["samples"]),
+        f"{one['period']:.4g} s" if one["samples"] > 1 else "–",
+        f"{one['low']:.6g} … {one['high']:.6g}" if one["samples"] else "–",
+        f"{one['gaps']}, longest {one['longest']:.3g} s" if one["gaps"] else "none",
+        str(one["bad"]),
     )
 
 
-def _print(found: Inspection) -> None:
+def _course(read: ReadSignal) -> NDArray[np.float64]:
+    """Return means of the values over equal parts of the time; nan where there is none."""
+    course = np.full(_PARTS, np.nan)
+    if read.stamps.size:
+        since = read.stamps - read.stamps[0]
+        part = np.minimum(since * _PARTS // (int(since[-1]) + 1), _PARTS - 1)
+        counts = np.bincount(part, minlength=_PARTS)
+        sums = np.bincount(part, read.values, minlength=_PARTS)
+        course[counts > 0] = sums[counts > 0] / counts[counts > 0]
+    return course
+
+
+def _picture(read: ReadSignal) -> str:
+    """Return the course of the values in one line of text."""
+    course = _course(read)
+    known = np.isfinite(course)
+    if not known.any():
+        return ""
+    span = float(np.ptp(course[known])) or 1.0
+    height = (course - course[known].min()) / span * (len(_BARS) - 1)
+    return "".join(
+        _BARS[round(float(one))] if there else " " for one, there in zip(height, known, strict=True)
+    )
+
+
+def _print(layout: Layout, reads: list[ReadSignal], signals: list[dict[str, Any]]) -> None:
     console = plain_console()
-    console.print(found.layout.words, soft_wrap=True)
+    console.print(layout.words, soft_wrap=True)
     others = [
         f"{printable(name) or 'without a name'} ({kind or 'empty'})"
-        for name, kind in found.kinds.items()
-        if name not in {one.name for one in found.signals}
+        for name, kind in layout.kinds.items()
+        if name not in {one["name"] for one in signals}
     ]
-    if found.signals:
+    if signals:
         heads = ("valve", "signal", "column", "unit", "values", "every", "range", "gaps", "bad")
-        rows = [_cells(one) for one in found.signals]
+        rows = [_cells(one) for one in signals]
         kept = [place for place in range(len(heads)) if any(row[place] for row in rows)]
         table = Table(*(heads[place] for place in kept), box=None, header_style="bold")
         for row in rows:
             table.add_row(*(row[place] for place in kept))
         console.print(table)
-        for one in found.signals:
-            console.print(f"{one.picture}  {printable(one.name)}", soft_wrap=True)
-        begin = min(one.begin for one in found.signals)
+        for read in reads:
+            console.print(f"{_picture(read)}  {printable(read.signal.name)}", soft_wrap=True)
+        begin = min(one["begin"] for one in signals)
         if begin >= _DATED:
             console.print(f"begins {utc_second(begin)}")
     if others:
@@ -92,18 +152,23 @@ def run(options: argparse.Namespace) -> int:
     description = valve_of(options)
     reading = reading_options(options, description.columns if description else None)
     with reading_progress():
-        found = inspected(options.file, reading.columns, reading.stretch)
-    layout = found.layout
+        table = OpenTable(options.file, reading.columns)
+        layout = table.layout
+        named = [(label, one) for label, group in layout.valves.items() for one in group]
+        reads: list[ReadSignal] = []
+        if not layout.questions:
+            reads = table.read([one for _, one in named], reading.stretch)
+    signals = [_inspected(label, read) for (label, _), read in zip(named, reads, strict=False)]
     if options.json:
         shown = {
             "words": layout.words,
             "questions": list(layout.questions),
-            "signals": [one.to_dict() for one in found.signals],
-            "columns": found.kinds,
+            "signals": [_as_json(one) for one in signals],
+            "columns": layout.kinds,
         }
         print(json.dumps(shown, ensure_ascii=False))
     else:
-        _print(found)
+        _print(layout, reads, signals)
     if layout.questions:
         complain(options.command, f"{options.file}: cannot tell {'; '.join(layout.questions)}")
         return ExitCode.REFUSED

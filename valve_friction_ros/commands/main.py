@@ -64,11 +64,6 @@ class SubCommand(Protocol):
         """
 
 
-def _imported(name: str) -> SubCommand:
-    package, _, _ = __name__.rpartition(".")
-    return cast(SubCommand, importlib.import_module(f"{package}.{re.sub('[- ]', '_', name)}"))
-
-
 def _chosen(arguments: Sequence[str]) -> tuple[str, list[str]]:
     """Return the sub-command and its arguments; end the process where there is none."""
     listed = "\n".join(f"  {name:<17} {text}" for name, text in SUB_COMMANDS.items())
@@ -94,13 +89,13 @@ def _chosen(arguments: Sequence[str]) -> tuple[str, list[str]]:
 
 
 def _run(name: str, arguments: Sequence[str]) -> int:
-    """Run a sub-command; errors of the user's request are reported."""
     from valve_friction_ros.commands.arguments.declared import DECLARATIONS  # noqa: PLC0415
 
     parser = OneLineParser(prog=f"{PROGRAM} {name}")
     DECLARATIONS[name](parser)
     options = parser.parse_args(arguments, argparse.Namespace(command=name))
-    module = _imported(name)
+    package, _, _ = __name__.rpartition(".")
+    module = cast(SubCommand, importlib.import_module(f"{package}.{re.sub('[- ]', '_', name)}"))
     refusals: tuple[type[Exception], ...] = (ValueError, *module.REFUSALS)
     try:
         with interrupt_raises():

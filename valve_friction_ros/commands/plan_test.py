@@ -10,11 +10,11 @@
 """Sub-command `plan-test`: the stroke test that tells the friction of a valve best, as a file."""
 
 import argparse
-import io
 import json
 import math
 import shlex
 import sys
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -23,20 +23,25 @@ from rich.table import Table
 
 from valve_friction_ros.commands.arguments.planning import (
     frictions_from,
-    planned_conditions,
-    planned_limits,
     planned_settings,
 )
 from valve_friction_ros.commands.console import OutputConsole, plain_console
 from valve_friction_ros.commands.process import ExitCode
 from valve_friction_ros.history import HistoryError
 from valve_friction_ros.identification import SLIDING, UNITS, RefusalError, percentage, plain
-from valve_friction_ros.planning import StrokePlan, plan_remarks, plan_test, set_points
+from valve_friction_ros.planning import (
+    Conditions,
+    Limits,
+    StrokePlan,
+    plan_remarks,
+    plan_test,
+    set_points,
+)
 from valve_friction_ros.planning.search import Forecast
 from valve_friction_ros.planning.steps import form_of, table_of
+from valve_friction_ros.records.files import write_whole
 from valve_friction_ros.records.units import PRESSURE, span
 from valve_friction_ros.records.valve_file import read_valve_file
-from valve_friction_ros.records.whole_file import write_whole
 from valve_friction_ros.wording import number_and_width
 
 _NAMES = (
@@ -61,11 +66,9 @@ def write_test(path: Path, plan: StrokePlan) -> None:
 
     Raises OSError, which names `path`; no part of the file stays.
     """
-    text = io.StringIO()
-    text.write("time_s,pressure_pa\n")
-    for time, pressure in zip(plan.test.times, plan.test.pressures, strict=True):
-        text.write(f"{time:.6f},{pressure:.2f}\n")
-    write_whole(path, text.getvalue().encode())
+    corners = zip(plan.test.times, plan.test.pressures, strict=True)
+    rows = ["time_s,pressure_pa", *(f"{time:.6f},{pressure:.2f}" for time, pressure in corners)]
+    write_whole(path, ("\n".join(rows) + "\n").encode())
 
 
 def player(plan: StrokePlan, path: Path, on_bench: bool = False) -> dict[str, Any]:
@@ -243,6 +246,13 @@ def _planned(options: argparse.Namespace) -> StrokePlan:
     """Read the files, and search with a bar on a terminal."""
     described = read_valve_file(options.valve, options.valve_name)
     frictions = frictions_from(options, described)
+    given = {one.name: vars(options).get(one.name, one.default) for one in fields(Limits)}
+    conditions = Conditions(
+        options.sample_rate,
+        1e-6 * options.position_noise_um,
+        options.pressure_noise_pa,
+        options.converter_lag,
+    )
     with Progress(
         TextColumn("comparing stroke tests"),
         BarColumn(),
@@ -256,8 +266,8 @@ def _planned(options: argparse.Namespace) -> StrokePlan:
         return plan_test(
             described.valve,
             frictions,
-            planned_limits(options),
-            planned_conditions(options),
+            Limits(**given),
+            conditions,
             planned_settings(options, described),
             options.aim,
             lambda share: bar.update(task, completed=share),

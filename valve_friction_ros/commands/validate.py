@@ -12,17 +12,12 @@
 import argparse
 import json
 import math
-from pathlib import Path
-from typing import Any, NamedTuple
+from collections.abc import Sequence
 
-from valve_friction_ros.commands.arguments.estimate_file import read_estimate
-from valve_friction_ros.commands.arguments.recording import (
-    described,
-    read_one,
-)
+from valve_friction_ros.commands.arguments.identification import read_estimate
+from valve_friction_ros.commands.arguments.recording import described, read_one
 from valve_friction_ros.commands.process import ExitCode
 from valve_friction_ros.identification import (
-    IdentifiedModel,
     RefusalError,
     Validation,
     identified_model,
@@ -37,17 +32,31 @@ from valve_friction_ros.wording import percentage
 REFUSALS = (RefusalError,)
 
 
-class _Result(NamedTuple):
-    """A validation, and what it was made from."""
+def _poor(validation: Validation, least: float) -> str:
+    """Return that the fit is poor, and the remedy; empty if it is not."""
+    if validation.fit >= least:
+        return ""
+    return (
+        f"poor: the model reproduces less than {100 * least:g} % of this movement: the valve has "
+        "changed, or the estimate is of another valve or of a poor record; identify this recording "
+        "too, and compare both results"
+    )
 
-    validation: Validation
-    model: IdentifiedModel
-    valve: Valve
-    notes: tuple[str, ...]
+
+def _print(validation: Validation, valve: Valve, notes: Sequence[str], poor: str) -> None:
+    share = valve.share_of_travel(validation.rms)
+    of_travel = f", {percentage(share)} of travel" if math.isfinite(share) else ""
+    print(f"fit {100 * validation.fit:.2f} %  (1 − ‖y − ŷ‖ / ‖y − ȳ‖)")
+    if poor:
+        print(poor)
+    print(f"rms error {validation.rms * 1e6:.3g} µm{of_travel}")
+    print(f"largest error {validation.maximum_error * 1e6:.3g} µm")
+    for note in notes:
+        print(f"note: {printable(note)}")
 
 
-def _validated(options: argparse.Namespace) -> _Result:
-    """Read the files and simulate."""
+def run(options: argparse.Namespace) -> int:
+    """Validate the model, print how well it describes the recording, and draw it."""
     description, reading = described(options.file, options.valve, options)
     valve = description.valve
     estimate = read_estimate(options.estimate)
@@ -65,65 +74,25 @@ def _validated(options: argparse.Namespace) -> _Result:
         validation = validate(recording, valve, model.parameters)
     except RefusalError as refusal:
         raise recorded.refused(refusal) from None
-    return _Result(validation, model, valve, (*recorded.notes, *model.notes))
-
-
-def _poor(validation: Validation, least: float) -> str:
-    """Return that the fit is poor, and the remedy; empty if it is not."""
-    if validation.fit >= least:
-        return ""
-    return (
-        f"poor: the model reproduces less than {100 * least:g} % of this movement: the valve has "
-        "changed, or the estimate is of another valve or of a poor record; identify this recording "
-        "too, and compare both results"
-    )
-
-
-def _as_json(result: _Result, poor: str) -> dict[str, Any]:
-    validation, model, valve, notes = result
-    return {
-        "fit": validation.fit,
-        "poor": poor or None,
-        "rms": validation.rms,
-        "rms_share_of_travel": plain(valve.share_of_travel(validation.rms)),
-        "maximum_error": validation.maximum_error,
-        "samples": len(validation.recording),
-        "sample_period": validation.recording.sample_period,
-        "parameters": vars(model.parameters),
-        "notes": list(notes),
-    }
-
-
-def _print(result: _Result, poor: str) -> None:
-    validation, _, valve, notes = result
-    share = valve.share_of_travel(validation.rms)
-    of_travel = f", {percentage(share)} of travel" if math.isfinite(share) else ""
-    print(f"fit {100 * validation.fit:.2f} %  (1 − ‖y − ŷ‖ / ‖y − ȳ‖)")
-    if poor:
-        print(poor)
-    print(f"rms error {validation.rms * 1e6:.3g} µm{of_travel}")
-    print(f"largest error {validation.maximum_error * 1e6:.3g} µm")
-    for note in notes:
-        print(f"note: {printable(note)}")
-
-
-def _draw(result: _Result, path: Path) -> None:
-    from valve_friction_ros import figures  # noqa: PLC0415 - slow to import
-
-    figures.save_picture(figures.validation_figure(result.validation, result.valve), path)
-
-
-def run(options: argparse.Namespace) -> int:
-    """Validate the model, print how well it describes the recording, and draw it."""
-    result = _validated(options)
-    least = options.fail_below
-    poor = _poor(result.validation, max(LEAST_FIT, least or 0.0))
+    notes, least = (*recorded.notes, *model.notes), options.fail_below
+    poor = _poor(validation, max(LEAST_FIT, least or 0.0))
     try:
         if options.json:
-            print(json.dumps(_as_json(result, poor), ensure_ascii=False, allow_nan=False))
+            shown = {
+                "fit": validation.fit,
+                "poor": poor or None,
+                "rms": validation.rms,
+                "rms_share_of_travel": plain(valve.share_of_travel(validation.rms)),
+                "maximum_error": validation.maximum_error,
+                "samples": len(validation.recording),
+                "sample_period": validation.recording.sample_period,
+                "parameters": vars(model.parameters),
+                "notes": list(notes),
+            }
+            print(json.dumps(shown, ensure_ascii=False, allow_nan=False))
         else:
-            _print(result, poor)
+            _print(validation, valve, notes, poor)
     finally:  # a closed output costs no picture, and a full disk no numbers
         if options.plot is not None:
-            _draw(result, options.plot)
-    return ExitCode.ALARM if least is not None and result.validation.fit < least else ExitCode.DONE
+            figures.save_picture(figures.validation_figure(validation, valve), options.plot)
+    return ExitCode.ALARM if least is not None and validation.fit < least else ExitCode.DONE

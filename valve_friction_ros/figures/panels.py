@@ -31,7 +31,7 @@ from valve_friction_ros.identification import (
     StemComparison,
 )
 from valve_friction_ros.model import Recording
-from valve_friction_ros.records.whole_file import write_whole
+from valve_friction_ros.records.files import write_whole
 from valve_friction_ros.wording import with_width
 
 _TITLE_WIDTH, _NOTE_WIDTH = 95, 130

@@ -20,6 +20,7 @@ from typing import Any
 
 from valve_friction_ros import __version__
 from valve_friction_ros.fleet.rows import (
+    DATED,
     PAGE,
     Cell,
     diagnosis_cells,
@@ -56,17 +57,14 @@ from valve_friction_ros.identification import (
     method_named,
 )
 from valve_friction_ros.model import Valve
+from valve_friction_ros.records.files import on_disk
 from valve_friction_ros.records.recorded_valve import RecordedValve
 from valve_friction_ros.records.recordings import ReadingOptions, read_recordings
-from valve_friction_ros.records.stores import on_disk
 from valve_friction_ros.streams import utc
 from valve_friction_ros.streams.samples import nanoseconds
 
 FILING = "filing"
 """What a row holds beside its columns until it is filed."""
-
-DATED = 946_684_800.0
-"""Time, s since 1970, from which a stamp is a date: the year 2000."""
 
 
 def kept_valve(tag: str) -> KeptValve:
@@ -171,12 +169,14 @@ class _Alarms:
         follow_alarms(self._history, self._valve, conditions, time)
 
 
-def baseline_kept(place: Path, tag: str) -> Baseline | None:
-    """Return the baseline that a history holds of a tag, if any.
+def baseline_kept(place: Path | None, tag: str) -> Baseline | None:
+    """Return the baseline that a history holds of a tag, if there are any of these.
 
     Raises HistoryError if it cannot be read.
     """
-    kept = HistoryFile(place).baseline(kept_valve(tag).name) if tag and place.exists() else None
+    if place is None or not tag or not place.exists():
+        return None
+    kept = HistoryFile(place).baseline(kept_valve(tag).name)
     return None if kept is None else kept.baseline
 
 

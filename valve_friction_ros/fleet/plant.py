@@ -18,36 +18,34 @@ from typing import Any
 
 import yaml
 
+from valve_friction_ros.outside_text import nearest
 from valve_friction_ros.records.columns import Columns
-from valve_friction_ros.records.spelling import nearest
+from valve_friction_ros.records.files import cause_of
 from valve_friction_ros.records.table import OpenTable
-from valve_friction_ros.records.units import AREA, LENGTH, MASS, PRESSURE, quantity, span
-from valve_friction_ros.records.valve_description import ActuatorData
+from valve_friction_ros.records.valve_description import QUESTIONS, valve_description
 from valve_friction_ros.records.valve_file import ValveFile, valve_file_of
-from valve_friction_ros.records.whole_file import cause_of
 
-_QUANTITIES = {"area": AREA, "travel": LENGTH, "opposing_area": AREA, "mass": MASS}
-_SPANS = {"spring": "spring_range", "range": "sensor_range"}
+_NUMBERS = {name: name for name in ("area", "travel", "opposing_area", "mass")}
+_NUMBERS |= {"spring": "spring_range", "range": "sensor_range"}
+"""Columns of numbers with units, and what `QUESTIONS` call them."""
 _WORDS = ("tag", "air_to", "sensor")
+_READ = {question.name: question.read for question in QUESTIONS}
 _HEADER = re.compile(r"\s*([\w ]+?)\s*(?:[\[(](.+)[\])])?\s*")
 _MOST_FAULTS = 6
 
 
-def _known() -> list[str]:
-    return [*_WORDS, *_QUANTITIES, *_SPANS, *(each.name for each in fields(Columns))]
+_KNOWN = [*_WORDS, *_NUMBERS, *(each.name for each in fields(Columns))]
 
 
-def _row(cells: Mapping[str, tuple[str, str]]) -> tuple[str, ActuatorData]:
-    """Build a valve from its cells, each with the unit of its column."""
+def _row(cells: Mapping[str, tuple[str, str]]) -> str:
+    """Return the valve file of a row, of whose cells each has the unit of its column."""
     values: dict[str, Any] = {}
     columns: dict[str, Any] = {}
     for name, (cell, unit) in cells.items():
         text = f"{cell} {unit}" if unit else cell
         try:
-            if name in _QUANTITIES:
-                values[name] = quantity(text, _QUANTITIES[name])
-            elif name in _SPANS:
-                values[_SPANS[name]] = span(text, PRESSURE)
+            if name in _NUMBERS:
+                values[_NUMBERS[name]] = _READ[_NUMBERS[name]](text)
             elif name not in _WORDS:
                 columns[name] = yaml.safe_load(cell) if cell.lower() in ("true", "false") else cell
         except ValueError as error:
@@ -55,13 +53,15 @@ def _row(cells: Mapping[str, tuple[str, str]]) -> tuple[str, ActuatorData]:
     tag = cells["tag"][0]
     if missing := [name for name in ("area", "travel") if name not in values]:
         raise ValueError(f"{tag}: {' and '.join(missing)} missing")
-    return tag, ActuatorData(
-        **values,
-        tag=tag,
-        is_absolute=cells.get("sensor", ("", ""))[0].casefold().startswith("abs"),
-        is_air_to_close=cells.get("air_to", ("", ""))[0].casefold() == "close",
-        columns=columns,
-    )
+    sensor, air_to = (cells.get(name, ("", ""))[0].casefold() for name in ("sensor", "air_to"))
+    words = {
+        "tag": tag,
+        "sensor": "absolute" if sensor.startswith("abs") else "gauge",
+        "air_to": "close" if air_to == "close" else "open",
+        "acting": "double" if "opposing_area" in values else "single",
+        "position": "plug",
+    }
+    return valve_description({**values, **words}, columns)
 
 
 def _table(path: Path) -> tuple[list[tuple[str, str]], list[list[str]]]:
@@ -76,8 +76,8 @@ def _table(path: Path) -> tuple[list[tuple[str, str]], list[list[str]]]:
     for cell in header:
         found = _HEADER.fullmatch(cell)
         name = found[1].casefold().replace(" ", "_") if found else cell
-        if name not in _known():
-            raise ValueError(f"{path}: unknown column {cell[:60]!r}: {nearest(name, _known())}")
+        if name not in _KNOWN:
+            raise ValueError(f"{path}: unknown column {cell[:60]!r}: {nearest(name, _KNOWN)}")
         heads.append((name, (found[2] or "") if found else ""))
     if "tag" not in dict(heads):
         raise ValueError(f"{path}: there is no column tag: give tag, area, travel, spring, range")
@@ -113,10 +113,10 @@ def read_plant(path: Path) -> dict[str, ValveFile]:
         try:
             if "tag" not in cells:
                 raise ValueError("it has no tag")
-            tag, data = _row(cells)
+            text, tag = _row(cells), cells["tag"][0]
             if tag in valves:
                 raise ValueError(f"a second {tag}")
-            valves[tag] = valve_file_of(yaml.safe_load(data.text()), path)
+            valves[tag] = valve_file_of(yaml.safe_load(text), path)
         except ValueError as error:
             faults.append(f"row {number}: {str(error).removeprefix(f'{path}: ')}")
     if faults:

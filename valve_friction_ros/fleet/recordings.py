@@ -23,13 +23,11 @@ from valve_friction_ros.health.valve_numbers import COMPARED, IDENTIFIED_ONLY, f
 from valve_friction_ros.identification import Verdict
 from valve_friction_ros.identification.units import column_suffix
 from valve_friction_ros.outside_text import as_read
-from valve_friction_ros.records.stores import explained, state_of, walk
-from valve_friction_ros.records.whole_file import cause_of
+from valve_friction_ros.records.files import cause_of, explained, state_of, walk
 
 _METADATA = "metadata.yaml"
 _BAG_KEY = b"rosbag2_bagfile_information"
 _VALVE_ENDING = "valve.yaml"
-_PACKED = (".gz", ".zstd")
 _STORAGE = (".mcap", ".db3")
 _TABLES = (".csv", ".tsv", ".xlsx", ".xlsm", ".parquet", ".txt", ".lvm", ".dat", ".mat")
 _PERHAPS = (".txt", ".dat")
@@ -56,7 +54,7 @@ class FoundRecording:
     @property
     def stem(self) -> str:
         """Its name without folders and endings: ``NAME`` of ``NAME.valve.yaml``."""
-        return self.path.name if self.path.is_dir() else _bare(self.path.name)
+        return self.path.name if self.path.is_dir() else Path(_unpacked_name(self.path.name)).stem
 
     def content(self) -> str:
         """Return a fingerprint of size and time of change of its file or files.
@@ -87,18 +85,11 @@ def is_valve_file(name: str) -> bool:
 
 
 def _unpacked_name(name: str) -> str:
-    for ending in _PACKED:
-        if name.lower().endswith(ending):
-            return name[: -len(ending)]
-    return name
+    return re.sub(r"\.(gz|zstd)\Z", "", name, flags=re.IGNORECASE | re.ASCII)
 
 
-def _bare(name: str) -> str:
-    return Path(_unpacked_name(name)).stem
-
-
-def _is_recording(name: str) -> bool:
-    return Path(_unpacked_name(name)).suffix.lower() in _ENDINGS
+def _ending(name: str) -> str:
+    return Path(_unpacked_name(name)).suffix.lower()
 
 
 def _may_be_table(path: Path) -> bool:
@@ -113,15 +104,11 @@ def _may_be_table(path: Path) -> bool:
     return len(_TWO_NUMBERS.findall(start)) >= _FEWEST_ROWS
 
 
-def _is_storage(name: str) -> bool:
-    return Path(_unpacked_name(name)).suffix.lower() in _STORAGE
-
-
 def _is_bag_folder(folder: Path, files: list[str]) -> bool:
     """Return whether a folder is a bag: metadata beside storage files, or metadata of rosbag2."""
     if _METADATA not in files:
         return False
-    if any(_is_storage(name) for name in files):
+    if any(_ending(name) in _STORAGE for name in files):
         return True
     try:
         return _BAG_KEY in (folder / _METADATA).read_bytes()
@@ -169,7 +156,7 @@ def _findings(folder: Path, own: set[Path]) -> Findings:
             path = here / name
             if path.resolve() in own or is_valve_file(name):
                 continue
-            is_one = not name.startswith(_HIDDEN) and _is_recording(name) and path.is_file()
+            is_one = not name.startswith(_HIDDEN) and _ending(name) in _ENDINGS and path.is_file()
             if not is_one or not _may_be_table(path):
                 skipped.append(path.relative_to(folder).as_posix())
             else:
@@ -278,8 +265,7 @@ def read_baselines(path: Path) -> Baselines:
                     )
                 found[recording][valve] = baseline
     except (OSError, UnicodeDecodeError, csv.Error) as error:
-        cause = cause_of(error)
-        raise ValueError(f"{path}: cannot be read: {cause}") from None
+        raise ValueError(f"{path}: cannot be read: {cause_of(error)}") from None
     if not found:
         raise ValueError(f"{path}: no friction in it is known well enough to be a baseline")
     return Baselines(MappingProxyType(found))

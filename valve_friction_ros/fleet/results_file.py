@@ -10,21 +10,18 @@
 """The results of many identifications: kept in SQLite, counted, written as CSV, JSON, a page."""
 
 import contextlib
-import csv
-import io
 import json
 import math
 import re
 import sqlite3
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from datetime import datetime, timezone
-from functools import partial
 from itertools import groupby
 from pathlib import Path
 from types import TracebackType
-from typing import NamedTuple
+from typing import Any, NamedTuple
 from urllib.parse import quote
 
 from valve_friction_ros import __version__
@@ -34,13 +31,12 @@ from valve_friction_ros.fleet.rows import (
     PICTURE,
     WIDTH,
     Cell,
-    RowStatus,
     ranked,
     status_of,
 )
-from valve_friction_ros.outside_text import harmless
+from valve_friction_ros.outside_text import csv_text
 from valve_friction_ros.page_template import page_environment
-from valve_friction_ros.records.whole_file import write_whole
+from valve_friction_ros.records.files import write_whole
 from valve_friction_ros.wording import in_zone, number_and_width, percentage
 
 _Row = Mapping[str, Cell]
@@ -93,7 +89,8 @@ class ResultsFile:
 
     def __init__(self, path: Path, *others: Path, zone: str = "") -> None:
         self.path = path
-        self._outputs = {output: writer_of(output, zone) for output in (path, *others)}
+        self._zone = zone
+        self._outputs = {output: writer_of(output) for output in (path, *others)}
         self._database = database_of(path)
         for output in self._outputs:
             if output.is_file() and not self._database.exists():
@@ -159,9 +156,8 @@ class ResultsFile:
                 yield dict(zip(_KEPT, cells, strict=True))
 
     def _write_outputs(self) -> None:
-        """Replace each output as a whole."""
         for output, write in self._outputs.items():
-            write_whole(output, write(self._rows(), output).encode())
+            write_whole(output, write(self._rows(), output, self._zone).encode())
 
     def entries(self) -> Iterator[RecordingRows]:
         """Go through the recordings."""
@@ -200,73 +196,42 @@ def reason_of(error: str) -> str:
     return _NUMBER.sub("…", _QUOTED.sub("'…'", error))
 
 
-@dataclass(frozen=True)
-class Reason:
-    """A reason of refusals, its numbers left open; its count of valves and its first recording."""
+class Tally(NamedTuple):
+    """Counts of valves, and why some were refused.
 
-    text: str
-    count: int
-    example: str
+    Attributes
+    ----------
+    outcomes : Counter of str
+        Valves by the verdict on their Coulomb friction, or `REFUSED`.
+    reasons : mapping of str to sequence of str
+        The recording of each refused valve by `reason_of` its error, the most frequent first.
+    """
 
-
-@dataclass
-class Tally:
-    """Counts of valves: by the verdict on their Coulomb friction, or `REFUSED`."""
-
-    outcomes: Counter[str] = field(default_factory=Counter)
-    _reasons: Counter[str] = field(default_factory=Counter)
-    _examples: dict[str, str] = field(default_factory=dict)
-
-    def add(self, recording: str, verdict: Cell, error: Cell) -> None:
-        """Count a valve by the verdict on its Coulomb friction, or by its error."""
-        if not error:
-            self.outcomes[str(verdict)] += 1
-            return
-        self.outcomes[REFUSED] += 1
-        reason = reason_of(str(error))
-        self._reasons[reason] += 1
-        self._examples.setdefault(reason, recording)
-
-    def reasons(self) -> list[Reason]:
-        """Return the reasons of refusals, the most frequent first."""
-        return [
-            Reason(text, count, self._examples[text]) for text, count in self._reasons.most_common()
-        ]
+    outcomes: Counter[str]
+    reasons: Mapping[str, Sequence[str]]
 
 
 def tally(entries: Iterable[RecordingRows]) -> Tally:
     """Count the valves of all entries."""
-    found = Tally()
+    outcomes: Counter[str] = Counter()
+    reasons: dict[str, list[str]] = {}
     for entry in entries:
         for row in entry.rows:
-            found.add(entry.recording, row["coulomb_friction_verdict"], row["error"])
-    return found
+            outcomes[REFUSED if row["error"] else str(row["coulomb_friction_verdict"])] += 1
+            if row["error"]:
+                reasons.setdefault(reason_of(str(row["error"])), []).append(entry.recording)
+    return Tally(outcomes, dict(sorted(reasons.items(), key=lambda one: -len(one[1]))))
 
 
-_Rows = Iterable[Mapping[str, Cell]]
-
-
-def _csv(rows: _Rows, _: Path) -> str:
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(COLUMNS)
-    writer.writerows([harmless(row[column]) for column in COLUMNS] for row in rows)
-    return text.getvalue()
-
-
-def _json_lines(rows: _Rows, _: Path) -> str:
+def _json_lines(rows: Iterable[_Row]) -> str:
     shown = ({column: row[column] for column in COLUMNS} for row in rows)
     return "".join(json.dumps(row, ensure_ascii=False, allow_nan=False) + "\n" for row in shown)
 
 
-def _page(rows: _Rows, output: Path, zone: str = "") -> str:
-    return page_text(rows, output.stem, zone)
-
-
-_WRITERS: Mapping[str, Callable[[_Rows, Path], str]] = {
-    ".csv": _csv,
-    ".jsonl": _json_lines,
-    ".html": _page,
+_WRITERS: Mapping[str, Callable[[Iterable[_Row], Path, str], str]] = {
+    ".csv": lambda rows, _output, _zone: csv_text(COLUMNS, rows),
+    ".jsonl": lambda rows, _output, _zone: _json_lines(rows),
+    ".html": lambda rows, output, zone: page_text(rows, output.stem, zone),
 }
 
 
@@ -275,16 +240,16 @@ def is_page(output: Path) -> bool:
     return output.suffix.lower() == ".html"
 
 
-def writer_of(output: Path, zone: str = "") -> Callable[[_Rows, Path], str]:
+def writer_of(output: Path) -> Callable[[Iterable[_Row], Path, str], str]:
     """Return what writes rows in the format that the name of the output ends in.
 
-    It takes the rows and the output, and returns the text. Raises ValueError if the ending is not
-    known; the message lists the known ones.
+    It takes the rows, the output, and the zone of times that people read, and returns the text.
+    Raises ValueError if the ending is not known; the message lists the known ones.
     """
     known = _WRITERS.get(output.suffix.lower())
     if known is None:
         raise ValueError(f"{output}: the output must end in {', '.join(_WRITERS)}")
-    return partial(_page, zone=zone) if is_page(output) else known
+    return known
 
 
 class _Number(NamedTuple):
@@ -293,23 +258,6 @@ class _Number(NamedTuple):
     text: str = ""
     detail: str = ""
     key: float = -math.inf
-
-
-class _Line(NamedTuple):
-    """A valve on the page, all of it text."""
-
-    status: RowStatus
-    name: str
-    recording: str
-    began: str
-    points: str
-    ratio: _Number
-    dead_band: _Number
-    sliding: _Number
-    coulomb: _Number
-    to_do: str
-    finding: str
-    report: str
 
 
 def _with_width(row: _Row, name: str) -> _Number:
@@ -335,29 +283,27 @@ def _dead_band(row: _Row) -> _Number:
     return _Number(percentage(share), "of travel", share)
 
 
-def _began(text: str, zone: str) -> str:
-    """Return when a record began, in words, in a zone."""
-    return in_zone(datetime.fromisoformat(text.replace("Z", "+00:00")), zone) if text else ""
+def _line(row: _Row, zone: str) -> dict[str, Any]:
+    """Return what the page shows of a valve, with times in a zone."""
 
-
-def _line(row: _Row, zone: str) -> _Line:
     def text(name: str) -> str:
         return str(row.get(name) or "")
 
-    return _Line(
-        status_of(row),
-        text("valve") or text("recording"),
-        text("recording") if text("valve") else "",
-        _began(text("began"), zone),
-        text(PICTURE),
-        _ratio(row),
-        _dead_band(row),
-        _with_width(row, "sliding_friction"),
-        _with_width(row, "coulomb_friction"),
-        text("what_to_do"),
-        text("error") or "; ".join(filter(None, (text("message"), text("findings")))),
-        quote(text("report")),
-    )
+    began = text("began").replace("Z", "+00:00")
+    return {
+        "status": status_of(row),
+        "name": text("valve") or text("recording"),
+        "recording": text("recording") if text("valve") else "",
+        "began": in_zone(datetime.fromisoformat(began), zone) if began else "",
+        "points": text(PICTURE),
+        "ratio": _ratio(row),
+        "dead_band": _dead_band(row),
+        "sliding": _with_width(row, "sliding_friction"),
+        "coulomb": _with_width(row, "coulomb_friction"),
+        "to_do": text("what_to_do"),
+        "finding": text("error") or "; ".join(filter(None, map(text, ("message", "findings")))),
+        "report": quote(text("report")),
+    }
 
 
 def page_text(rows: Iterable[_Row], name: str, zone: str = "") -> str:
@@ -373,7 +319,7 @@ def page_text(rows: Iterable[_Row], name: str, zone: str = "") -> str:
         .render(
             name=name,
             lines=lines,
-            counts=Counter(line.status for line in lines),
+            counts=Counter(line["status"] for line in lines),
             size=(WIDTH, HEIGHT),
             made=in_zone(datetime.now(timezone.utc), zone),
             version=__version__,

@@ -31,7 +31,7 @@ from valve_friction_ros.health import (
 )
 from valve_friction_ros.identification import PARAMETER_UNITS, Result, parameter_columns, plain
 from valve_friction_ros.model import Recording
-from valve_friction_ros.records.whole_file import write_whole
+from valve_friction_ros.records.files import write_whole
 from valve_friction_ros.reports.identified_record import what_to_do
 
 Cell = str | float | int | None
@@ -71,7 +71,7 @@ COLUMNS: tuple[str, ...] = (
 PICTURE = "picture"
 """What a row holds beside its columns: the points of its picture."""
 
-_DATED = 946_684_800.0
+DATED = 946_684_800.0
 """Time, s since 1970, from which a stamp is a date: the year 2000."""
 
 
@@ -80,7 +80,7 @@ def _one_line(text: str) -> str:
 
 
 def _began(recording: Recording) -> str | None:
-    if recording.start_time < _DATED:
+    if recording.start_time < DATED:
         return None
     began = datetime.fromtimestamp(recording.start_time, timezone.utc)
     return f"{began:%Y-%m-%dT%H:%M:%SZ}"

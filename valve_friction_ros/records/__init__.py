@@ -14,9 +14,8 @@ from typing import TYPE_CHECKING
 from valve_friction_ros.on_demand import names_on_demand
 
 if TYPE_CHECKING:
-    from valve_friction_ros.records.recorded_valve import RecordedValve
+    from valve_friction_ros.records.recorded_valve import RecordedValve, Stretch
     from valve_friction_ros.records.recordings import ReadingOptions, read_recordings
-    from valve_friction_ros.records.stretch import Stretch
     from valve_friction_ros.records.valve_file import ValveFile, read_valve_file
 else:
     __getattr__ = names_on_demand(__name__)

@@ -14,10 +14,9 @@ import math
 import zoneinfo
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
-from types import MappingProxyType
 from typing import Any
 
-from valve_friction_ros.records.spelling import nearest
+from valve_friction_ros.outside_text import nearest
 from valve_friction_ros.records.units import (
     FORCE_UNITS,
     NANOSECONDS,
@@ -29,14 +28,12 @@ from valve_friction_ros.records.units import (
     unit_named,
 )
 
-KNOWN_UNITS: Mapping[str, tuple[str, ...]] = MappingProxyType(
-    {
-        "time": (*NANOSECONDS,),
-        "position": (*POSITION_UNITS, *SHARES),
-        "pressure": (*PRESSURE_UNITS, *SHARES),
-        "force": (*FORCE_UNITS,),
-    }
-)
+KNOWN_UNITS: Mapping[str, tuple[str, ...]] = {
+    "time": (*NANOSECONDS,),
+    "position": (*POSITION_UNITS, *SHARES),
+    "pressure": (*PRESSURE_UNITS, *SHARES),
+    "force": (*FORCE_UNITS,),
+}
 """Names of the units in which a column may be."""
 
 _DELIMITERS = {"tab": "\t", "\\t": "\t", "comma": ",", "semicolon": ";", "space": " "}

@@ -7,11 +7,15 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""What headers and tags say: the quantity, its unit, and the valve."""
+"""What headers, tags and cells say: a quantity, its unit and its valve; a number, its unit."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from valve_friction_ros.records.units import (
     FORCE_UNITS,
@@ -19,6 +23,7 @@ from valve_friction_ros.records.units import (
     POSITION_UNITS,
     PRESSURE_UNITS,
     SHARES,
+    Unit,
     unit_named,
 )
 
@@ -58,13 +63,13 @@ _VAGUE = frozenset(("in", "h", "d", "m", "s", "n", "pu"))
 _IDLE = frozenset(["pv", "x", "t", "state", "fluid", "msg", "data"])
 """Words that name neither a quantity nor a valve."""
 
-UNITS = {
-    "time": frozenset(NANOSECONDS),
-    "position": frozenset(POSITION_UNITS),
-    "pressure": frozenset(PRESSURE_UNITS),
-    "force": frozenset(FORCE_UNITS),
+UNITS: dict[str, Mapping[str, Unit]] = {
+    "time": {name: Unit(size, 1e9) for name, size in NANOSECONDS.items()},
+    "position": POSITION_UNITS,
+    "pressure": PRESSURE_UNITS,
+    "force": FORCE_UNITS,
 }
-_KNOWN = frozenset(unit for units in UNITS.values() for unit in units) | frozenset(SHARES)
+_KNOWN = {*SHARES}.union(*UNITS.values())
 
 
 class Named(NamedTuple):
@@ -81,8 +86,6 @@ class Named(NamedTuple):
         What is left of the name: the valve.
     is_strong : bool
         Whether it speaks of the actuator or the stem itself.
-    is_absolute : bool
-        Whether the unit is of an absolute pressure.
     """
 
     quantity: str
@@ -178,3 +181,72 @@ def _quantity(found: Sequence[str], unit: str, words: Sequence[str]) -> str:
         if name in found:
             return name
     return ""
+
+
+_LONGEST = 60
+"""Characters of a number with its unit. Chosen: beyond any."""
+
+
+@lru_cache
+def _pattern(decimal: str) -> re.Pattern[str]:
+    other = "," if decimal == "." else r"\."
+    point = re.escape(decimal)
+    groups = rf"[1-9]\d{{0,2}}(?:(?:{other}\d{{3}})+|(?:['’\u00a0\u202f]\d{{3}})+)"
+    whole = rf"(?:{groups}|\d+|(?={point}\d))"
+    return re.compile(
+        rf"(?P<number>[+\-−]?{whole}(?:{point}\d*)?(?:[eE][+\-]?\d+)?)\s*(?P<unit>[^\d\s].{{0,11}})?",
+        re.ASCII,
+    )
+
+
+@lru_cache(maxsize=4096)
+def number_and_unit(text: str, decimal: str) -> tuple[float, str] | None:
+    """Read a number, with its unit if there is one; None if it is none.
+
+    Of comma and point, the one that is not the `decimal` mark separates thousands.
+    """
+    text = text.strip()
+    if len(text) > _LONGEST:
+        return None
+    found = _pattern(decimal).fullmatch(text)
+    if found is None:
+        return None
+    unit = known_unit(found["unit"] or "")
+    if found["unit"] and not unit:
+        return None
+    thousands = "," if decimal == "." else "."
+    plain = re.sub(r"['’\u00a0\u202f]", "", found["number"]).replace(thousands, "")
+    value = float(plain.replace("−", "-").replace(decimal, "."))
+    return (value, unit) if np.isfinite(value) else None
+
+
+def numbers(texts: Sequence[str], decimal: str, unit: str) -> NDArray[np.float64]:
+    """Read numbers in `unit`, shape (n,); nan stands for what is none."""
+    together = "".join(texts)
+    plain = texts
+    if decimal == "," and "." not in together:
+        plain = [text.replace(",", ".") for text in texts]
+    if together.isascii() and "_" not in together and (decimal == "." or "." not in together):
+        try:
+            found = np.fromiter(map(float, plain), np.float64, len(plain))
+            return np.where(np.isfinite(found), found, np.nan)
+        except ValueError:
+            pass
+    return np.fromiter((_converted(text, decimal, unit) for text in texts), np.float64, len(texts))
+
+
+def _converted(text: str, decimal: str, unit: str) -> float:
+    read = number_and_unit(text, decimal)
+    if read is None:
+        return np.nan
+    value, own = read
+    if not own or own == unit:
+        return value
+    if own in SHARES and unit in SHARES:
+        (low, high), (begin, end) = SHARES[own], SHARES[unit]
+        return begin + (value - low) / (high - low) * (end - begin)
+    for known in UNITS.values():
+        if own in known and unit in known:
+            one, other = known[own], known[unit]
+            return value * one.multiplier / one.divisor * other.divisor / other.multiplier
+    return np.nan

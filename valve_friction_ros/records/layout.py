@@ -7,16 +7,18 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""How a table is read: its signals, times and marks, and what of it is open."""
+"""A table as it is seen at first, and how it is to be read: signals, times, marks, questions."""
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+import re
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 
 from valve_friction_ros.records.columns import Columns
-from valve_friction_ros.records.numbers_in_text import Marks
+from valve_friction_ros.records.header_words import Named, known_unit, named, number_and_unit
 from valve_friction_ros.records.table_rows import RawTable
-from valve_friction_ros.records.written_times import TimeForm
+from valve_friction_ros.records.written_times import TimeForm, is_date, is_day, is_time_of_day
 
 _NAMES = {"\t": "tab", ";": "semicolon", ",": "comma", "|": "bar", " ": "blanks"}
 _MOST_LABELS = 6
@@ -49,8 +51,6 @@ class TableSignal:
         SeenColumn of its times, or of days and times of the day.
     quality : int or None
         SeenColumn of its qualities.
-    tag : str
-        Its tag where each row is one value.
     """
 
     quantity: str
@@ -59,7 +59,6 @@ class TableSignal:
     place: int
     time: tuple[int, ...]
     quality: int | None = None
-    tag: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,8 +84,8 @@ class Layout:
         SeenColumn of the tags where each row is one value.
     good : mapping of int to callable
         Tells good qualities by their column.
-    marks : Marks
-        Decimal and thousands marks.
+    decimal : str
+        Decimal mark of its numbers.
     texts : tuple of str
         All that stands above the values, and the tags: what may name the valve.
     kinds : mapping of str to str
@@ -104,7 +103,7 @@ class Layout:
     times: Mapping[tuple[int, ...], TimeForm]
     tag_place: int | None
     good: Mapping[int, Callable[[str], bool]]
-    marks: Marks
+    decimal: str
     texts: tuple[str, ...]
     kinds: Mapping[str, str]
     questions: tuple[str, ...] = ()
@@ -154,5 +153,220 @@ def _in_unit(unit: str) -> str:
     return f" in {'%' if unit == 'percent' else unit}" if unit else ""
 
 
-class AmbiguousTableError(ValueError):
-    """A table leaves something open; the message asks for all of it at once."""
+_DELIMITERS = ("\t", ";", ",", "|", " ")
+_MOST_HEADER_ROWS = 8
+_TYPES = ("#TYPES", "#ROWS", "#datatype", "#group", "#default")
+"""Beginnings of rows above the headers, of Ignition and InfluxDB, that name none."""
+_MOST_NAMES = 20
+
+
+@dataclass
+class SeenColumn:
+    """A column while it is looked at."""
+
+    place: int
+    name: str
+    said: Named
+    cells: list[str] = field(default_factory=list)
+    kind: str = ""
+
+    @property
+    def filled(self) -> list[str]:
+        """The entries that are not empty."""
+        return [cell for cell in self.cells if cell]
+
+
+class Look:
+    """Looks at the first rows of a table."""
+
+    def __init__(self, raw: RawTable, form: Columns) -> None:
+        self.raw, self.form = raw, form
+        self.questions: list[str] = []
+        self.decimal, self.delimiter = self._found_marks()
+        self.rows = [
+            (line, [cell.strip() for cell in row]) for line, row in raw.rows(self.delimiter)
+        ]
+        self.start = self._start()
+        self.columns = self._columns()
+
+    # What separates the cells, and the decimals.
+
+    def _found_marks(self) -> tuple[str, str]:
+        if not self.raw.is_text:
+            return ".", ""
+        form = self.form
+        delimiters = [form.delimiter] if form.delimiter else _DELIMITERS
+        decimals = [form.decimal] if form.decimal else (".", ",")
+        scores: dict[tuple[str, str], int] = {}
+        for delimiter in delimiters:
+            rows = [row for _, row in self.raw.rows(delimiter)]
+            rows = rows[len(rows) // 3 :] if len(rows) > 3 else rows
+            for decimal in decimals:
+                scores[delimiter, decimal] = sum(
+                    _is_value(cell.strip(), decimal) for row in rows for cell in row
+                )
+        best = max(scores.values(), default=0)
+        delimiter, decimal = next(key for key, score in scores.items() if score == best)
+        if best == 0 and not form.delimiter:
+            delimiter = self._of_headers()
+        elif not form.decimal and scores.get((delimiter, ","), -1) == scores[delimiter, "."]:
+            decimal = self._decimal_of_even(delimiter)
+        return decimal, delimiter
+
+    def _of_headers(self) -> str:
+        """Return the mark that splits the first line most often, where no row has values."""
+        line = next(filter(str.strip, self.raw.head))
+        counts = {mark: line.count(mark) for mark in _DELIMITERS[:-1]}
+        return max(counts, key=lambda mark: counts[mark]) if any(counts.values()) else ","
+
+    def _decimal_of_even(self, delimiter: str) -> str:
+        """Return the decimal mark where every number could be of either; ask if it matters."""
+        cells = [cell for _, row in self.raw.rows(delimiter) for cell in row]
+        commas = [cell for cell in cells if re.fullmatch(r"\s*-?\d{1,3}(,\d{3})+\s*", cell)]
+        if not commas:
+            return "."
+        if delimiter == ";":
+            return ","
+        self.questions.append(
+            f"whether {quoted(commas[0].strip())} has a decimal comma or thousands "
+            "(--decimal , or --decimal .)"
+        )
+        return "."
+
+    # Where the values begin, and what stands above them.
+
+    def _start(self) -> int:
+        """Return the index of the first row of values, below all rows without."""
+        rows = [row for _, row in self.rows]
+        lower = rows[len(rows) // 2 :] if len(rows) > 3 else rows
+
+        def has_value(row: Sequence[str], place: int) -> bool:
+            return place < len(row) and _is_value(row[place], self.decimal)
+
+        counts = Counter(
+            place for row in lower for place in range(len(row)) if has_value(row, place)
+        )
+        least = 0.3 * max(counts.values(), default=0)
+        places = [place for place, count in counts.items() if count >= least]
+        begin = len(rows)
+        for index in range(len(rows) - 1, self.form.skip_rows - 1, -1):
+            row = rows[index]
+            comment = self.form.comment and row and row[0].startswith(self.form.comment)
+            if not any(row) or comment or row[0].startswith(_TYPES):
+                continue
+            if not any(has_value(row, place) for place in places):
+                if begin < len(rows) or index < len(rows) // 2:
+                    break
+                continue
+            begin = index
+        return begin
+
+    def _header_rows(self) -> list[list[str]]:
+        above = [row for _, row in self.rows[self.form.skip_rows : self.start] if any(row)]
+        given = [value for name, value in vars(self.form).items() if name.endswith("_column")]
+        for index, row in enumerate(above):
+            names = _names(row)
+            if any(one in names for one in filter(None, given)):
+                return above[index:]
+        kept: list[list[str]] = []
+        for row in reversed(above[-_MOST_HEADER_ROWS:]):
+            if row[0].startswith(_TYPES):
+                del kept[: row[0] == "#TYPES"]
+            elif kept and sum(map(bool, row)) < 2 and not row[0].startswith("#"):
+                break
+            else:
+                kept.insert(0, row)
+        return kept
+
+    def _columns(self) -> list[SeenColumn]:
+        header = self._header_rows()
+        values = [row for _, row in self.rows[self.start :] if any(row)]
+        wide = max(map(len, [*header, *values]), default=0)
+        units = next((row for row in header[1:] if _are_units(row)), [""] * wide)
+        texts = [row for row in header if row is not units]
+        if texts:
+            texts.sort(key=lambda row: -sum(map(bool, row)))  # a stable order: the uppermost first
+            texts = [row for row in texts if sum(map(bool, row)) >= 0.6 * sum(map(bool, texts[0]))]
+        names = _names(texts[0]) if texts else [str(place + 1) for place in range(wide)]
+        columns = []
+        for place in range(wide):
+            name = names[place] if place < len(names) else ""
+            own = [name] + [row[place] for row in texts[1:] if place < len(row)]
+            unit = units[place] if place < len(units) else ""
+            column = SeenColumn(place, name, named(own, unit) if texts else Named(""))
+            column.cells = [row[place] if place < len(row) else "" for row in values]
+            column.kind = self._kind(column)
+            columns.append(column)
+        self.unit_row = {
+            column.name: known_unit(units[column.place])
+            for column in columns
+            if column.place < len(units)
+        }
+        return columns
+
+    def _kind(self, column: SeenColumn) -> str:
+        cells = column.filled
+        if not cells:
+            return ""
+        tests: Mapping[str, Callable[[str], bool]] = {
+            "number": lambda cell: number_and_unit(cell, self.decimal) is not None,
+            "date": is_date,
+            "clock": is_time_of_day,
+            "day": is_day,
+        }
+        counts = {kind: sum(map(test, cells)) for kind, test in tests.items()}
+        if column.said.quantity == "time" and self.form.time_format:
+            return "date"
+        best = max(counts, key=lambda kind: counts[kind])
+        if best == "day" and counts["number"] == counts["day"] and column.said.quantity != "time":
+            best = "number"
+        return best if counts[best] >= 0.3 * len(cells) else "text"
+
+    @property
+    def above(self) -> int:
+        """Number of lines above the values."""
+        return self.rows[self.start - 1][0] if self.start else 0
+
+    @property
+    def names(self) -> str:
+        """The first names of columns, for a question."""
+        names = [column.name[:LONGEST_QUOTE] or "''" for column in self.columns[:_MOST_NAMES]]
+        return ", ".join(names)
+
+    def of_kind(self, kind: str, quantity: str | None = None) -> list[SeenColumn]:
+        """Return the columns of a kind, or those of them whose names speak of a quantity."""
+        found = [column for column in self.columns if column.kind == kind]
+        return [one for one in found if quantity is None or one.said.quantity == quantity]
+
+    def by_name(self, name: str, option: str) -> SeenColumn | None:
+        """Return the column of a name that was given; ask again if there is none, or two."""
+        found = [column for column in self.columns if column.name == name]
+        if len(found) == 1:
+            return found[0]
+        if len(found) > 1:
+            self.questions.append(f"two columns are named {name!r}: rename one of them")
+            return None
+        more = ", …" if len(self.columns) > _MOST_NAMES else ""
+        self.questions.append(f"there is no column {name!r} among {self.names}{more} ({option})")
+        return None
+
+
+def _names(row: Sequence[str]) -> list[str]:
+    """Return the headers in a row; numpy and others put a # before the first."""
+    names = [cell.strip()[:1000] for cell in row]
+    if names[:1] == ["#"]:
+        return names[1:]
+    return [names[0].lstrip("#").lstrip(), *names[1:]] if names else []
+
+
+def _is_value(cell: str, decimal: str) -> bool:
+    return bool(cell) and (
+        number_and_unit(cell, decimal) is not None or is_date(cell) or is_time_of_day(cell)
+    )
+
+
+def _are_units(row: Sequence[str]) -> bool:
+    """Return whether a row holds units: of most of its cells beside those of times and remarks."""
+    cells = [cell for cell in row if cell.strip()]
+    known = sum(bool(known_unit(cell)) for cell in cells)
+    return known > 0 and 2 * known >= len(cells) - 1

@@ -23,14 +23,19 @@ from statistics import median, mode
 from typing import Any
 
 from valve_friction_ros.records.columns import KNOWN_UNITS, Columns
-from valve_friction_ros.records.first_look import Look, SeenColumn
-from valve_friction_ros.records.header_words import Named, named
-from valve_friction_ros.records.layout import LONGEST_QUOTE, OWN, Layout, TableSignal, quoted
-from valve_friction_ros.records.numbers_in_text import is_number, number_and_unit
+from valve_friction_ros.records.header_words import Named, named, number_and_unit
+from valve_friction_ros.records.layout import (
+    OWN,
+    Layout,
+    Look,
+    SeenColumn,
+    TableSignal,
+    quoted,
+)
 from valve_friction_ros.records.table_rows import RawTable
 from valve_friction_ros.records.written_times import TimeForm, clock_of, date_forms, is_date
 
-_MOST_NAMES, _MOST_CHOICES = 20, 6
+_MOST_CHOICES, _MOST_TAGS = 6, 10_000
 _COARSE = 0.5
 """Steps of a time without a unit that are seconds; larger ones may be milliseconds. Chosen."""
 _GOOD = re.compile(r"(good|ok|gut|valid|true|g|yes|ja|gültig)\b.*|\(?good\b.*", re.IGNORECASE)
@@ -47,14 +52,8 @@ _Candidate = tuple[str, Named, int]
 class _Recognition(Look):
     """Finds signals and times in a table that was looked at."""
 
-    def __init__(
-        self,
-        raw: RawTable,
-        form: Columns,
-        scan: Callable[[RawTable, Look, Sequence[int]], list[list[str]]],
-    ) -> None:
+    def __init__(self, raw: RawTable, form: Columns) -> None:
         super().__init__(raw, form)
-        self._scan = scan
         self.times: dict[tuple[int, ...], TimeForm] = {}
         self.good: dict[int, Callable[[str], bool]] = {}
         self.tag_place: int | None = None
@@ -68,45 +67,30 @@ class _Recognition(Look):
         if self.form.time_column:
             column = self.by_name(self.form.time_column, "--time-column")
             return [(column.place,)] if column else []
-        dates: list[tuple[int, ...]] = [
-            (column.place,) for column in self.columns if column.kind == "date"
-        ]
+        dates: list[tuple[int, ...]] = [(column.place,) for column in self.of_kind("date")]
         fine = [place for place in dates if not self._repeats(place[0])]
         if dates and (fine or not self._numeric_times()):
             return fine or dates
         for day, clock in pairwise(self.columns):
             if (day.kind, clock.kind) == ("day", "clock"):
                 return [(day.place, clock.place)]
-        if clocks := [column for column in self.columns if column.kind == "clock"]:
+        if clocks := self.of_kind("clock"):
             return [(clocks[0].place,)]
         numeric = self._numeric_times()
         if len(numeric) == 1 or (numeric and self._are_pairs(numeric)):
             return [(column.place,) for column in numeric]
-        choice = numeric or [
-            column
-            for column in self.columns
-            if column.kind == "number" and not column.said.quantity
-        ]
-        self._ask_column("time", choice)
+        self._ask_column("time", numeric or self.of_kind("number", ""))
         return []
 
     def _repeats(self, place: int) -> bool:
         """Return whether times come more often than the signals of a long form explain."""
         cells = self.columns[place].filled
-        texts = (len({*column.filled}) for column in self.columns if column.kind == "text")
-        return len(cells) > 1 and mode_count(cells) > max(texts, default=1)
+        texts = (len({*column.filled}) for column in self.of_kind("text"))
+        return len(cells) > 1 and max(Counter(cells).values()) > max(texts, default=1)
 
     def _numeric_times(self) -> list[SeenColumn]:
-        found = [
-            column
-            for column in self.columns
-            if column.kind == "number" and column.said.quantity == "time"
-        ]
-        return found or [
-            column
-            for column in self.columns
-            if column.kind == "number" and not column.said.quantity and self._clock(column)
-        ]
+        found = self.of_kind("number", "time")
+        return found or [one for one in self.of_kind("number", "") if self._clock(one)]
 
     def _are_pairs(self, times: Sequence[SeenColumn]) -> bool:
         """Return whether each time has its own value beside it."""
@@ -115,7 +99,7 @@ class _Recognition(Look):
         )
 
     def _numbers(self, column: SeenColumn) -> list[float]:
-        read = (number_and_unit(cell, self.marks) for cell in column.filled)
+        read = (number_and_unit(cell, self.decimal) for cell in column.filled)
         return [one[0] for one in read if one is not None]
 
     def _clock(self, column: SeenColumn) -> tuple[str, int] | None:
@@ -166,7 +150,7 @@ class _Recognition(Look):
                 "'%d.%m.%Y %H:%M:%S.%f')"
             )
             return TimeForm(("%Y",))
-        if forms.is_ambiguous:
+        if forms.day_first and forms.month_first:
             self.questions.append(
                 f"whether {quoted(texts[0])} has the day first (--time-format "
                 f"{shlex.quote(forms.day_first[0])}) or the month (--time-format "
@@ -204,34 +188,21 @@ class _Recognition(Look):
         if self.form.value_column:
             column = self.by_name(self.form.value_column, "--value-column")
             return column.place if column else -1
-        numeric = [
-            column
-            for column in self.columns
-            if column.kind == "number"
-            and column.place not in times
-            and column.said.quantity != "quality"
-        ]
-        called = [column for column in numeric if column.said.quantity == "value"]
-        if len(called or numeric) == 1:
-            return (called or numeric)[0].place
-        self._ask_column("value", called or numeric)
+        numeric = [one for one in self.of_kind("number") if one.place not in times]
+        numeric = [one for one in numeric if one.said.quantity != "quality"]
+        found = [one for one in numeric if one.said.quantity == "value"] or numeric
+        if len(found) == 1:
+            return found[0].place
+        self._ask_column("value", found)
         return -1
 
     def _find_tags(self, times: set[int]) -> None:
         """Find out whether each row is one value, and its tags."""
-        texts = [
-            column
-            for column in self.columns
-            if column.kind in ("text", "number")
-            and column.place not in times
-            and column.said.quantity == "tag"
-            and column.kind == "text"
-        ]
-        values = [c for c in self.columns if c.kind == "number" and c.said.quantity == "value"]
+        texts = [one for one in self.of_kind("text", "tag") if one.place not in times]
         if self.form.tag_column:
             column = self.by_name(self.form.tag_column, "--tag-column")
             texts = [column] if column else []
-        elif not values:
+        elif not self.of_kind("number", "value"):
             return
         if len(texts) > 1:
             self._ask_column("tag", texts)
@@ -240,8 +211,23 @@ class _Recognition(Look):
         self.tag_place = texts[0].place
         unit = next((c for c in self.columns if c.said.quantity == "unit"), None)
         wanted = [self.tag_place] + ([unit.place] if unit else [])
-        for row in self._scan(self.raw, self, wanted):
-            self.tags.setdefault(row[0], named([row[0]], row[1] if unit else ""))
+        for tag, *of_unit in self._different(wanted):
+            self.tags.setdefault(tag, named([tag], of_unit[0] if unit else ""))
+
+    def _different(self, places: Sequence[int]) -> list[tuple[str, ...]]:
+        """Return the different rows of some columns of the whole table: its tags."""
+        found: dict[tuple[str, ...], None] = {}
+        for _, block in self.raw.blocks(places, self.delimiter, self.start + 1, self.above):
+            parts = block[list(places)].astype(str).drop_duplicates()
+            for row in parts.itertuples(index=False):
+                cells = tuple(str(cell).strip() for cell in row)
+                if cells[0]:
+                    found.setdefault(cells)
+            if len(found) > _MOST_TAGS:
+                raise ValueError(
+                    f"{self.raw.path}: more than {_MOST_TAGS} tags: name the --tag-column"
+                )
+        return list(found)
 
     def _ask_column(self, quantity: str, among: Sequence[SeenColumn]) -> None:
         self._ask_name(quantity, [column.name for column in among])
@@ -249,8 +235,7 @@ class _Recognition(Look):
     def _ask_name(self, quantity: str, among: Sequence[str]) -> None:
         listed = " or ".join(shlex.quote(name) for name in among[:_MOST_CHOICES])
         more = " …" if len(among) > _MOST_CHOICES else ""
-        names = [column.name[:LONGEST_QUOTE] or "''" for column in self.columns[:_MOST_NAMES]]
-        listed = listed or f"one of {', '.join(names)}"
+        listed = listed or f"one of {self.names}"
         article = "the column of the" if self.tag_place is None else "the tag of the"
         self.questions.append(f"{article} {quantity} (--{quantity}-column {listed}{more})")
 
@@ -258,8 +243,7 @@ class _Recognition(Look):
         unit = self._unit(quantity, name, said, place)
         before = [key for key in self.times if key[0] < place]
         time = max(before, key=lambda key: key[0], default=next(iter(self.times), (0,)))
-        tag = name if self.tag_place is not None else ""
-        return TableSignal(quantity, name, unit, place, time, self._quality(place, said, time), tag)
+        return TableSignal(quantity, name, unit, place, time, self._quality(place, said, time))
 
     def _unit(self, quantity: str, name: str, said: Named, place: int) -> str:
         given = getattr(self.form, f"{quantity}_unit")
@@ -294,15 +278,13 @@ class _Recognition(Look):
 
     def _unit_in_cells(self, place: int) -> str:
         cells = self.columns[place].filled
-        units = [read[1] for cell in cells if (read := number_and_unit(cell, self.marks))]
+        units = [read[1] for cell in cells if (read := number_and_unit(cell, self.decimal))]
         return mode(units) if units else ""
 
     def _quality(self, place: int, said: Named, time: tuple[int, ...]) -> int | None:
         """Return the column of the qualities of a signal: that with its name, or the next one."""
-        found = [column for column in self.columns if column.said.quantity == "quality"]
-        found = [column for column in found if column.filled and column.place not in time]
-        if not found:
-            return None
+        found = [one for one in self.columns if one.said.quantity == "quality" and one.filled]
+        found = [one for one in found if one.place not in time]
         alike = [c for c in found if said.label and c.said.label == said.label]
         beside = [c for c in found if c.place == place + 1] or (alike if len(found) > 1 else found)
         if not beside:
@@ -317,12 +299,12 @@ class _Recognition(Look):
             words = {word.strip().casefold() for word in self.form.good_quality.split(",")}
             return lambda cell: cell.strip().casefold() in words
         cells = column.filled
-        numbers = [read[0] for cell in cells if (read := number_and_unit(cell, self.marks))]
+        numbers = self._numbers(column)
         if len(numbers) == len(cells):
             is_opc = any(_OPC_GOOD <= value <= _OPC_MOST for value in numbers)
             least = _OPC_GOOD if is_opc else max(numbers)
             if is_opc or least == _CERTAIN or len(set(numbers)) == 1:
-                return lambda cell: is_number(cell) and float(cell) >= least
+                return lambda cell: bool(number_and_unit(cell, ".")) and float(cell) >= least
         elif any(map(_GOOD.fullmatch, cells)):
             return lambda cell: _GOOD.fullmatch(cell.strip()) is not None
         elif len(set(cells)) == 1:
@@ -389,30 +371,20 @@ class _Recognition(Look):
         return own or found
 
     def _pairs(
-        self,
-        drives: Sequence[_Candidate],
-        positions: Sequence[_Candidate],
+        self, drives: Sequence[_Candidate], positions: Sequence[_Candidate]
     ) -> dict[str, tuple[_Candidate, _Candidate]]:
         """Return drive and position of each valve, by its label."""
         if len(drives) == 1 and len(positions) == 1:
             return {"": (drives[0], positions[0])}
         pairs = {}
         for label in dict.fromkeys(said.label for _, said, _ in drives):
-            own = [one for one in drives if one[1].label == label]
-            stems = [one for one in positions if one[1].label == label]
-            own = [one for one in own if one[1].is_strong] if len(own) > 1 else own
-            stems = [one for one in stems if one[1].is_strong] if len(stems) > 1 else stems
+            own = _clearest([one for one in drives if one[1].label == label])
+            stems = _clearest([one for one in positions if one[1].label == label])
             if label and len(own) == 1 and len(stems) == 1:
                 pairs[label] = (own[0], stems[0])
-        if not pairs and drives and positions:
-            own = [one for one in drives if one[1].is_strong] if len(drives) > 1 else [*drives]
-            stems = (
-                [one for one in positions if one[1].is_strong]
-                if len(positions) > 1
-                else [*positions]
-            )
-            if len(own) == 1 and len(stems) == 1:
-                pairs[""] = (own[0], stems[0])
+        own, stems = _clearest(drives), _clearest(positions)
+        if not pairs and len(own) == 1 and len(stems) == 1:
+            pairs[""] = (own[0], stems[0])
         return pairs
 
     def _ask_signals(
@@ -429,9 +401,7 @@ class _Recognition(Look):
                     self._unit(quantity, *found[0])
                 continue
             unknown = [
-                name
-                for name, named_, _ in candidates
-                if named_.quantity in ("", "value", "command")
+                name for name, said_, _ in candidates if said_.quantity in ("", "value", "command")
             ]
             self._ask_name(quantity, [name for name, _, _ in found] or unknown)
 
@@ -443,48 +413,27 @@ def _as_written(label: str, name: str) -> str:
     return found[0] if found else label
 
 
-def mode_count(cells: Sequence[str]) -> int:
-    """Return how often the most frequent cell is there."""
-    return Counter(cells).most_common(1)[0][1]
+def _clearest(candidates: Sequence[_Candidate]) -> Sequence[_Candidate]:
+    """Return an only candidate; of several, those that speak of actuator or stem themselves."""
+    return candidates if len(candidates) == 1 else [one for one in candidates if one[1].is_strong]
 
 
-def recognized(
-    raw: RawTable,
-    form: Columns,
-    scan: Callable[[RawTable, Look, Sequence[int]], list[list[str]]],
-) -> Layout:
-    """Find out how a table is to be read.
-
-    Parameters
-    ----------
-    raw : RawTable
-        The table.
-    form : Columns
-        What is said of it.
-    scan : callable
-        Returns the different rows of some columns of the whole table: its tags.
-
-    Returns
-    -------
-    Layout
-        With the questions that the table leaves open.
-    """
-    look = _Recognition(raw, form, scan)
+def recognized(raw: RawTable, form: Columns) -> Layout:
+    """Find out how a table is to be read, by what is said of it, and what it leaves open."""
+    look = _Recognition(raw, form)
     valves = look.signals()
     first = next(iter(look.times), ())
     time = look.times.get(first, TimeForm())
-    drive, position = next(iter(valves.values()), (None, None))[:2] if valves else (None, None)
+    drive, position, *_ = next(iter(valves.values()), (None, None))
     found: dict[str, Any] = {
         "delimiter": look.delimiter,
-        "decimal": look.marks.decimal if raw.is_text else "",
+        "decimal": look.decimal if raw.is_text else "",
         "encoding": form.encoding or (raw.encoding if raw.encoding == "cp1252" else ""),
         "time_zone": form.time_zone or time.zone,
     }
     if len(first) == 1:
         found["time_column"] = look.columns[first[0]].name
         found["time_unit"] = time.unit if not time.origin else ""
-        if len(time.formats) > 0 and not time.formats[0].startswith("%Y"):
-            found["time_format"] = form.time_format
     if len(valves) == 1 and drive and position:
         for signal in (drive, position):
             found[f"{signal.quantity}_column"] = signal.name
@@ -493,19 +442,18 @@ def recognized(
         found["tag_column"] = look.columns[look.tag_place].name
         found["value_column"] = look.columns[drive.place].name if drive else ""
     taken = {place for places in look.times for place in places}
-    above = look.rows[look.start - 1][0] if look.start else 0
     texts = [cell for _, row in look.rows[: look.start] for cell in row if cell]
     return Layout(
         raw,
         replace(form, **{name: value for name, value in found.items() if value}),
         tuple(column.name for column in look.columns),
         look.start + 1,
-        above,
+        look.above,
         valves,
         look.times,
         look.tag_place,
         look.good,
-        look.marks,
+        look.decimal,
         (*texts, *look.tags),
         {
             column.name: "time" if column.place in taken else column.said.quantity or column.kind

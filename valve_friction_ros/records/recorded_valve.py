@@ -7,13 +7,15 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The recording of one valve from a file."""
+"""The recording of one valve from a file, and the part of the file to read."""
 
+import math
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.model.recording import Recording
+from valve_friction_ros.streams.samples import nanoseconds
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,3 +56,40 @@ class RecordedValve:
     def refused(self, cause: RefusalError) -> RefusalError:
         """Return a refusal with file, valve and notes; the notes may hold its reason."""
         return RefusalError("; ".join((f"{self.label}: {cause}", *self.notes)))
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """A part of a recording; by default the whole recording.
+
+    Attributes
+    ----------
+    begin, end : float
+        Times since the first sample of the file, s; both belong to the stretch.
+    last : float
+        Length of its end, s. A recording that ends when a node identified, read with the
+        node's `window`, equals the node's buffer.
+
+    Raises
+    ------
+    ValueError
+        If a time is not a number, or the stretch is empty.
+    """
+
+    begin: float = -math.inf
+    end: float = math.inf
+    last: float = math.inf
+
+    def __post_init__(self) -> None:
+        """Refuse empty stretches."""
+        if not self.begin < self.end:
+            raise ValueError(f"a stretch cannot begin at {self.begin:g} s and end at {self.end:g}")
+        if not self.last > 0:
+            raise ValueError(f"the last seconds must be above zero, got {self.last:g}")
+
+    def contains(self, since_first: int) -> bool:
+        """Return whether a time after the first sample, ns, lies between begin and end."""
+        begin, end = (
+            nanoseconds(one) if math.isfinite(one) else one for one in (self.begin, self.end)
+        )
+        return begin <= since_first <= end

@@ -20,11 +20,9 @@ from numpy.typing import NDArray
 from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.model.drive import Drive
 from valve_friction_ros.model.valve import Valve
-from valve_friction_ros.records.bags.storage import bag_libraries, is_bag
-from valve_friction_ros.records.bags.topics import TopicChoice
+from valve_friction_ros.records.bags.topics import TopicChoice, bag_libraries, is_bag
 from valve_friction_ros.records.columns import Columns
-from valve_friction_ros.records.recorded_valve import RecordedValve
-from valve_friction_ros.records.stretch import Stretch
+from valve_friction_ros.records.recorded_valve import RecordedValve, Stretch
 from valve_friction_ros.records.table import OpenTable, ReadSignal, left_out, require_good
 from valve_friction_ros.records.table_rows import readable
 from valve_friction_ros.records.units import (
@@ -172,8 +170,7 @@ def read_table(
     table.require_settled()
     valves = table.layout.valves
     if name is not None and len(valves) > 1:
-        wanted = name.strip("/").casefold()
-        chosen = {one: each for one, each in valves.items() if _plain(one) == _plain(wanted)}
+        chosen = {one: each for one, each in valves.items() if _plain(one) == _plain(name)}
         if not chosen:
             known = ", ".join(valves)
             raise ValueError(f"{path}: no valve is called {name!r}: choose one of {known}")
@@ -181,14 +178,13 @@ def read_table(
     every = [signal for signals in valves.values() for signal in signals]
     read = dict(zip(every, table.read(every, stretch), strict=True))
     form = table.layout.form
-    if len(valves) == 1:
-        ((label, signals),) = valves.items()
-        return (_recorded(table, label, [read[one] for one in signals], valve, form),)
     found = []
     for label, signals in valves.items():
         try:
             one = _recorded(table, label, [read[each] for each in signals], valve, form)
         except (ValueError, RefusalError) as error:
+            if len(valves) == 1:
+                raise
             reason = str(error).removeprefix(f"{path}: ")
             one = RecordedValve(path, label, RefusalError(reason))
         found.append(one)

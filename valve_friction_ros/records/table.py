@@ -23,13 +23,12 @@ from numpy.typing import NDArray
 
 from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.records.columns import Columns
-from valve_friction_ros.records.first_look import Look
-from valve_friction_ros.records.layout import AmbiguousTableError, Layout, TableSignal, quoted
-from valve_friction_ros.records.numbers_in_text import numbers
+from valve_friction_ros.records.files import cause_of
+from valve_friction_ros.records.header_words import numbers
+from valve_friction_ros.records.layout import Layout, TableSignal, quoted
 from valve_friction_ros.records.recognition import recognized
-from valve_friction_ros.records.stretch import Stretch
-from valve_friction_ros.records.table_rows import RawTable, open_raw
-from valve_friction_ros.records.whole_file import cause_of
+from valve_friction_ros.records.recorded_valve import Stretch
+from valve_friction_ros.records.table_rows import open_raw
 from valve_friction_ros.records.written_times import NO_TIME, TimeForm, WrittenTimes
 
 if TYPE_CHECKING:
@@ -81,26 +80,25 @@ class _Parts:
     """The blocks of a signal while it is read."""
 
     signal: TableSignal
-    stamps: list[NDArray[np.int64]] = field(default_factory=list)
-    values: list[NDArray[np.float64]] = field(default_factory=list)
-    rows: list[NDArray[np.int64]] = field(default_factory=list)
+    blocks: list[ReadSignal] = field(default_factory=list)
     bad: Counter[str] = field(default_factory=Counter)
     example: tuple[int, str, str] = (0, "", "")
 
     def forget_before(self, begin: float) -> None:
-        while self.stamps and not (self.stamps[0] >= begin).all():
-            kept = self.stamps[0] >= begin
-            self.stamps[0], self.rows[0] = self.stamps[0][kept], self.rows[0][kept]
-            self.values[0] = self.values[0][kept]
+        while self.blocks and not (kept := self.blocks[0].stamps >= begin).all():
             if kept.any():
+                self.blocks[0] = self.blocks[0].where(kept)
                 return
-            del self.stamps[0], self.values[0], self.rows[0]
+            del self.blocks[0]
 
-    def joined(self) -> ReadSignal:
-        stamps = np.concatenate([np.empty(0, np.int64), *self.stamps])
-        values = np.concatenate([np.empty(0), *self.values])
-        rows = np.concatenate([np.empty(0, np.int64), *self.rows])
-        return ReadSignal(self.signal, stamps, values, rows, self.bad, self.example)
+    def joined(self, last: float) -> ReadSignal:
+        stamps = np.concatenate([np.empty(0, np.int64), *(one.stamps for one in self.blocks)])
+        values = np.concatenate([np.empty(0), *(one.values for one in self.blocks)])
+        rows = np.concatenate([np.empty(0, np.int64), *(one.rows for one in self.blocks)])
+        found = ReadSignal(self.signal, stamps, values, rows, self.bad, self.example)
+        if stamps.size and math.isfinite(last):
+            return found.where(stamps >= stamps[-1] - last * 1e9)
+        return found
 
 
 class OpenTable:
@@ -117,21 +115,20 @@ class OpenTable:
     def __init__(self, path: Path, form: Columns | None = None) -> None:
         self.path = path
         raw = open_raw(path, form or Columns())
-        self.layout: Layout = recognized(raw, form or Columns(), _different)
-        self._stretched = Stretch()
+        self.layout: Layout = recognized(raw, form or Columns())
 
     def require_settled(self) -> None:
-        """Raise AmbiguousTableError if the table leaves something open: all of it, in one line."""
+        """Raise ValueError if the table leaves something open: all of it, in one line."""
         layout = self.layout
         if not layout.questions:
             return
         if not layout.times and not layout.valves and len(layout.headers) < 2:
             (only, *_) = (*layout.headers, "")
-            raise AmbiguousTableError(
+            raise ValueError(
                 f"{self.path}: there is only one column, {quoted(only)}: name the delimiter of the "
                 "file (--delimiter)"
             )
-        raise AmbiguousTableError(f"{self.path}: cannot tell {'; '.join(layout.questions)}")
+        raise ValueError(f"{self.path}: cannot tell {'; '.join(layout.questions)}")
 
     def read(
         self,
@@ -165,11 +162,11 @@ class OpenTable:
             for part in parts:
                 self._keep(part, block, row_numbers, stamps_of, bounds)
             self._drop_old(parts, stretch)
-            most = max(sum(each.size for each in part.stamps) for part in parts)
+            most = max(sum(each.stamps.size for each in part.blocks) for part in parts)
             self._require_room(most)
         if start is None and not any(part.bad for part in parts):
             raise ValueError(f"{self.path}: there are no rows under the header")
-        found = [_within(part.joined(), stretch) for part in parts]
+        found = [part.joined(stretch.last) for part in parts]
         if not any(each.stamps.size for each in found) and not any(each.bad for each in found):
             raise RefusalError(
                 f"{self.path}: the chosen stretch holds no rows: choose another begin or end"
@@ -181,7 +178,6 @@ class OpenTable:
     ) -> Iterator[
         tuple[dict[tuple[int, ...], NDArray[np.int64]], "pd.DataFrame", NDArray[np.int64]]
     ]:
-        """Yield blocks with their times."""
         layout = self.layout
         keys = dict.fromkeys(signal.time for signal in signals)
         clocks = {key: WrittenTimes(layout.times[key]) for key in keys}
@@ -215,7 +211,7 @@ class OpenTable:
         if cells.dtype.kind in "fiu":
             found = cells.to_numpy(np.float64)
             return np.where(np.isfinite(found), found, np.nan)
-        return numbers(cells.fillna("").astype(str).tolist(), self.layout.marks, unit)
+        return numbers(cells.fillna("").astype(str).tolist(), self.layout.decimal, unit)
 
     def _keep(
         self,
@@ -245,10 +241,8 @@ class OpenTable:
         timeless = good & (stamps == NO_TIME)
         self._count(part, rows, block[signal.time[-1]], timeless)
         good &= ~timeless
-        part.stamps.append(stamps[good])
-        part.values.append(values[good])
-        part.rows.append(rows[good])
-        self._in_order(ReadSignal(signal, stamps[good], values[good], rows[good]))
+        part.blocks.append(ReadSignal(signal, stamps[good], values[good], rows[good]))
+        self._in_order(part.blocks[-1])
 
     def _there(
         self, block: "pd.DataFrame", cells: "pd.Series[Any]", signal: TableSignal
@@ -258,8 +252,8 @@ class OpenTable:
             there = cells.notna().to_numpy()
         else:
             there = (cells.fillna("").astype(str).str.strip() != "").to_numpy()
-        if self.layout.tag_place is not None and signal.tag:
-            there &= (block[self.layout.tag_place].str.strip() == signal.tag).to_numpy()
+        if self.layout.tag_place is not None:
+            there &= (block[self.layout.tag_place].str.strip() == signal.name).to_numpy()
         return np.asarray(there, np.bool_)
 
     def _count(
@@ -283,15 +277,15 @@ class OpenTable:
             part.example = (int(rows[bad][0]), name, str(texts.iloc[0]))
 
     def _drop_old(self, parts: Sequence[_Parts], stretch: Stretch) -> None:
-        newest = [part.stamps[-1][-1] for part in parts if part.stamps and part.stamps[-1].size]
-        if not newest or not math.isfinite(stretch.last) or self._is_newest_first(parts):
+        last = [part.blocks[-1].stamps for part in parts if part.blocks]
+        newest = [stamps[-1] for stamps in last if stamps.size]
+        if not newest or not math.isfinite(stretch.last):
+            return
+        first = next(one.stamps for part in parts for one in part.blocks if one.stamps.size)
+        if first[0] > first[-1]:  # the newest row comes first
             return
         for part in parts:
             part.forget_before(min(newest) - (stretch.last + 1) * 1e9)
-
-    def _is_newest_first(self, parts: Sequence[_Parts]) -> bool:
-        stamps = next(stamps for part in parts for stamps in part.stamps if stamps.size)
-        return bool(stamps[0] > stamps[-1])
 
     def _require_room(self, count: int) -> None:
         most = self.layout.form.maximum_rows
@@ -328,40 +322,19 @@ class OpenTable:
         remedy = "sort the rows, or use the record before or after it"
         if repeats:
             remedy = "export it with fractions of a second, or delete one of the rows"
-        elif form.is_date and not form.has_zone and not form.zone:
+        elif form.formats and not form.has_zone and not form.zone:
             remedy += "; of clocks that were put back name the zone (--time-zone)"
         place = f"row {read.rows[sample]}, column {column!r}"
         return f"{self.path}: {place} {what} ({now} after {before}): {remedy}"
 
 
 def _shown(stamp: int, form: TimeForm) -> str:
-    return str(np.datetime64(int(stamp), "ns")) if form.is_date else f"{stamp / 1e9:.12g} s"
+    return str(np.datetime64(int(stamp), "ns")) if form.formats else f"{stamp / 1e9:.12g} s"
 
 
 def _first(stamps: Any) -> int | None:
     firsts = [int(known[0]) for each in stamps if (known := each[each != NO_TIME]).size]
     return min(firsts) if firsts else None
-
-
-def _within(read: ReadSignal, stretch: Stretch) -> ReadSignal:
-    if math.isfinite(stretch.last) and read.stamps.size:
-        return read.where(read.stamps >= read.stamps[-1] - stretch.last * 1e9)
-    return read
-
-
-def _different(raw: RawTable, look: Look, places: Sequence[int]) -> list[list[str]]:
-    """Return the different rows of some columns of the whole table: its tags."""
-    found: dict[tuple[str, ...], None] = {}
-    above = look.rows[look.start - 1][0] if look.start else 0
-    for _, block in raw.blocks(places, look.delimiter, look.start + 1, above):
-        parts = block[list(places)].astype(str).drop_duplicates()
-        for row in parts.itertuples(index=False):
-            cells = tuple(str(cell).strip() for cell in row)
-            if cells[0]:
-                found.setdefault(cells)
-        if len(found) > _MOST_TAGS:
-            raise ValueError(f"{raw.path}: more than {_MOST_TAGS} tags: name the --tag-column")
-    return [list(row) for row in found]
 
 
 def left_out(read: ReadSignal) -> str:

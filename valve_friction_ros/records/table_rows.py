@@ -28,7 +28,7 @@ import sys
 import tempfile
 import zipfile
 import zlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextvars import ContextVar
 from dataclasses import dataclass
 from datetime import datetime
@@ -39,7 +39,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from valve_friction_ros.records.columns import Columns
-from valve_friction_ros.records.whole_file import cause_of
+from valve_friction_ros.records.files import cause_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -205,7 +205,6 @@ class RawTable:
     head: tuple[str, ...] = ()
     cells: Sequence[Sequence[str]] = ()
     encoding: str = ""
-    are_headers_first: bool = False
 
     @property
     def is_text(self) -> bool:
@@ -282,7 +281,7 @@ class RawTable:
                     told(cast(Any, text.buffer).raw.share)
 
     def _cell_blocks(self, places: Sequence[int], first: int) -> Iterator[Cells]:
-        begin = 1 + self.are_headers_first
+        begin = 1 + (_start(self.place) != _ZIP)
         for block in _frames(self.place, self.form, places):
             numbers = np.arange(begin, begin + len(block), dtype=np.int64)
             begin += len(block)
@@ -314,14 +313,13 @@ def _text(path: Path, form: Columns, encoding: str) -> io.TextIOWrapper:
     return io.TextIOWrapper(stream, encoding, "strict" if form.encoding else "replace")
 
 
-_ZIP, _PARQUET, _OLD_EXCEL, _MATLAB = b"PK\x03\x04", b"PAR1", b"\xd0\xcf\x11\xe0", b"MATL"
-_KINDS = {_ZIP: "excel", _PARQUET: "parquet", _OLD_EXCEL: "old", _MATLAB: "matlab"}
+_ZIP = b"PK\x03\x04"
 
 
-def _kind(path: Path) -> str:
-    """Return what a file is, by its first bytes; empty for a text."""
+def _start(path: Path) -> bytes:
+    """Return the first bytes of a file, which tell what reads it."""
     with path.open("rb") as stream:
-        return _KINDS.get(stream.read(4), "")
+        return stream.read(4)
 
 
 def open_raw(path: Path, form: Columns) -> RawTable:
@@ -331,12 +329,12 @@ def open_raw(path: Path, form: Columns) -> RawTable:
     """
     place = readable(path, form.maximum_megabytes)
     try:
-        kind = _kind(place)
+        is_text = _start(place) not in _READERS
     except OSError as error:
         raise ValueError(f"{path}: cannot be read as CSV: {cause_of(error)}") from None
-    with _explained(path, not kind):
-        if kind:
-            table = _looked_at(path, form, place, kind)
+    with _explained(path, is_text):
+        if not is_text:
+            table = _looked_at(path, form, place)
         else:
             with io.BufferedReader(_Bounded(place, form.maximum_megabytes), _PIECE) as stream:
                 encoding = form.encoding or _encoding(stream.peek(_PIECE)[:_PIECE])
@@ -348,17 +346,14 @@ def open_raw(path: Path, form: Columns) -> RawTable:
     return table
 
 
-def _looked_at(path: Path, form: Columns, place: Path, kind: str) -> RawTable:
-    if kind == "old":
-        raise ValueError("a workbook of Excel before 2007: save it as .xlsx or CSV")
+def _looked_at(path: Path, form: Columns, place: Path) -> RawTable:
     block = next(_frames(place, form, None), None)
     if block is None:
         return RawTable(path, form, place)
     rows = [[_shown(cell) for cell in row] for row in block.head(LOOKED_AT).itertuples(index=False)]
-    is_typed = kind != "excel"
-    if is_typed:
+    if _start(place) != _ZIP:
         rows.insert(0, [str(name) for name in block.columns])
-    return RawTable(path, form, place, cells=rows, are_headers_first=is_typed)
+    return RawTable(path, form, place, cells=rows)
 
 
 def _library(name: str) -> Any:
@@ -382,9 +377,7 @@ def _shown(cell: object) -> str:
 
 def _frames(path: Path, form: Columns, places: Sequence[int] | None) -> Iterator["pd.DataFrame"]:
     """Yield the columns of a file of cells, all without `places`, called by their places."""
-    kind = _kind(path)
-    read = {"excel": _excel, "parquet": _parquet, "matlab": _matlab}[kind]
-    for frame in read(path, form, places):
+    for frame in _READERS[_start(path)](path, form, places):
         yield frame if places is None else frame.set_axis(list(places), axis="columns")
 
 
@@ -415,10 +408,9 @@ def _excel(path: Path, form: Columns, places: Sequence[int] | None) -> Iterator[
             )
 
 
-def _parquet(path: Path, form: Columns, places: Sequence[int] | None) -> Iterator["pd.DataFrame"]:
+def _parquet(path: Path, _: Columns, places: Sequence[int] | None) -> Iterator["pd.DataFrame"]:
     table = _library("pyarrow.parquet").ParquetFile(path)
     size = table.metadata.num_rows
-    del form
     names = table.schema_arrow.names
     wanted = names if places is None else [names[place] for place in places]
     for batch in table.iter_batches(min(BLOCK, max(size, 1)), columns=wanted):
@@ -443,3 +435,16 @@ def _matlab(path: Path, form: Columns, places: Sequence[int] | None) -> Iterator
     longest = max((each.size for each in vectors.values()), default=0)
     frame = pd.DataFrame({name: v for name, v in vectors.items() if v.size == longest})
     yield frame if places is None else frame.iloc[:, list(places)]
+
+
+def _old_excel(*_: object) -> Iterator["pd.DataFrame"]:
+    raise ValueError("a workbook of Excel before 2007: save it as .xlsx or CSV")
+
+
+_READERS: Mapping[bytes, Callable[..., Iterator["pd.DataFrame"]]] = {
+    _ZIP: _excel,
+    b"PAR1": _parquet,
+    b"MATL": _matlab,
+    b"\xd0\xcf\x11\xe0": _old_excel,
+}
+"""What reads a file of cells, by its first bytes."""

@@ -11,7 +11,6 @@
 
 import re
 from collections.abc import Mapping
-from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
@@ -42,110 +41,78 @@ _POUND_FORCE = 4.4482216152605
 _KILOGRAM_FORCE = 9.80665
 """N: exact by definition, the pound of 0.45359237 kg and the standard gravity of 9.80665 m/s²."""
 
-PRESSURE_UNITS = MappingProxyType(
-    {
-        "Pa": Unit(1),
-        "hPa": Unit(100),
-        "kPa": Unit(1e3),
-        "MPa": Unit(1e6),
-        "mbar": Unit(100),
-        "bar": Unit(1e5),
-        "psi": Unit(_POUND_FORCE, 6.4516e-4),
-        "kgf/cm2": Unit(_KILOGRAM_FORCE, 1e-4),
-        "inH2O": Unit(249.08891),
-        "inHg": Unit(3386.389),
-        "mmHg": Unit(133.322387415),
-    }
-)
+PRESSURE_UNITS: Mapping[str, Unit] = {
+    "Pa": Unit(1),
+    "hPa": Unit(100),
+    "kPa": Unit(1e3),
+    "MPa": Unit(1e6),
+    "mbar": Unit(100),
+    "bar": Unit(1e5),
+    "psi": Unit(_POUND_FORCE, 6.4516e-4),
+    "kgf/cm2": Unit(_KILOGRAM_FORCE, 1e-4),
+    "inH2O": Unit(249.08891),
+    "inHg": Unit(3386.389),
+    "mmHg": Unit(133.322387415),
+}
 
-POSITION_UNITS = MappingProxyType(
-    {
-        "m": Unit(1),
-        "cm": Unit(1, 100),
-        "mm": Unit(1, 1e3),
-        "um": Unit(1, 1e6),
-        "in": Unit(254, 1e4),
-    }
-)
+POSITION_UNITS: Mapping[str, Unit] = {
+    "m": Unit(1),
+    "cm": Unit(1, 100),
+    "mm": Unit(1, 1e3),
+    "um": Unit(1, 1e6),
+    "in": Unit(254, 1e4),
+}
 
 PERCENT = "percent"
-SHARES = MappingProxyType({PERCENT: (0.0, 100.0), "fraction": (0.0, 1.0), "mA": (4.0, 20.0)})
+SHARES: Mapping[str, tuple[float, float]] = {
+    PERCENT: (0.0, 100.0),
+    "fraction": (0.0, 1.0),
+    "mA": (4.0, 20.0),
+}
 """Units of a share: of the travel, or of the range of the pressure sensor; both ends of it."""
 
-FORCE_UNITS = MappingProxyType(
-    {
-        "N": Unit(1),
-        "kN": Unit(1e3),
-        "lbf": Unit(_POUND_FORCE),
-        "kgf": Unit(_KILOGRAM_FORCE),
-    }
-)
+FORCE_UNITS: Mapping[str, Unit] = {
+    "N": Unit(1),
+    "kN": Unit(1e3),
+    "lbf": Unit(_POUND_FORCE),
+    "kgf": Unit(_KILOGRAM_FORCE),
+}
 
-NANOSECONDS = MappingProxyType(
-    {
-        "ns": 1,
-        "us": 1_000,
-        "ms": 1_000_000,
-        "s": 1_000_000_000,
-        "min": 60_000_000_000,
-        "h": 3_600_000_000_000,
-        "d": 86_400_000_000_000,
-        "microdays": 86_400_000,
-    }
-)
+NANOSECONDS: Mapping[str, int] = {
+    "ns": 1,
+    "us": 1_000,
+    "ms": 1_000_000,
+    "s": 1_000_000_000,
+    "min": 60_000_000_000,
+    "h": 3_600_000_000_000,
+    "d": 86_400_000_000_000,
+    "microdays": 86_400_000,
+}
 """Units of time in nanoseconds, the unit of all stamps."""
 
-_OTHER_NAMES = MappingProxyType(
-    {
-        "%": PERCENT,
-        "pct": PERCENT,
-        "prozent": PERCENT,
-        "0-1": "fraction",
-        "0..1": "fraction",
-        "p.u.": "fraction",
-        "pu": "fraction",
-        "ratio": "fraction",
-        "4-20 mA": "mA",
-        "4..20 mA": "mA",
-        "µm": "um",
-        "μm": "um",
-        "µs": "us",
-        "μs": "us",
-        "sec": "s",
-        "secs": "s",
-        "second": "s",
-        "seconds": "s",
-        "sek": "s",
-        "millisecond": "ms",
-        "milliseconds": "ms",
-        "msec": "ms",
-        "minute": "min",
-        "minutes": "min",
-        "hours": "h",
-        "days": "d",
-        '"': "in",
-        "inch": "in",
-        "inches": "in",
-        "meter": "m",
-        "metre": "m",
-        "millimeter": "mm",
-        "millimetre": "mm",
-        "micron": "um",
-        "newton": "N",
-        "pascal": "Pa",
-        "psig": "psi",
-        "psia": "psi",
-        "barg": "bar",
-        "bara": "bar",
-        "kPag": "kPa",
-        "kPaa": "kPa",
-        "mbarg": "mbar",
-        "kg/cm2": "kgf/cm2",
-        "kg/cm²": "kgf/cm2",
-        "kgf/cm²": "kgf/cm2",
-    }
-)
-
+_NAMES = {
+    PERCENT: "%, pct, prozent",
+    "fraction": "0-1, 0..1, p.u., pu, ratio",
+    "mA": "4-20 mA, 4..20 mA",
+    "us": "µs, μs",
+    "ms": "millisecond, milliseconds, msec",
+    "s": "sec, secs, second, seconds, sek",
+    "min": "minute, minutes",
+    "h": "hours",
+    "d": "days",
+    "um": "µm, μm, micron",
+    "mm": "millimeter, millimetre",
+    "m": "meter, metre",
+    "in": '", inch, inches',
+    "N": "newton",
+    "Pa": "pascal",
+    "kPa": "kPag, kPaa",
+    "mbar": "mbarg",
+    "bar": "barg, bara",
+    "psi": "psig, psia",
+    "kgf/cm2": "kg/cm2, kg/cm², kgf/cm²",
+}
+_OTHER_NAMES = {name: unit for unit, names in _NAMES.items() for name in names.split(", ")}
 
 _GAUGE_OR_ABSOLUTE = re.compile(r"\s*(?:\((?:g|a|abs|gauge|Ü|ü)\)|\s(?:abs|gauge|absolute|Ü|ü))$")
 """What follows a unit of pressure; the `pressure_reference` of the valve says the same."""
@@ -188,9 +155,7 @@ def _unit(text: str, name: str | None, units: Mapping[str, Unit]) -> Unit:
 
 
 def _si(number: str, unit: Unit) -> float:
-    import numpy as np  # noqa: PLC0415 - slow to import
-
-    return float(unit.to_si(np.array([float(number.replace(",", "."))]))[0])
+    return float(number.replace(",", ".")) * unit.multiplier / unit.divisor
 
 
 def quantity(text: str, units: Mapping[str, Unit]) -> float:

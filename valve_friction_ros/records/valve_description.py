@@ -7,125 +7,134 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The data of an actuator, and the valve file that they make."""
+"""What is asked of an actuator, and the valve file that the answers make."""
 
 import json
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
-from typing import Any
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
+from typing import Any, NamedTuple
+
+from valve_friction_ros.records.units import AREA, LENGTH, MASS, PRESSURE, quantity, span
 
 _ATMOSPHERE = 101_325.0
 
 
-@dataclass(frozen=True)
-class ActuatorData:
-    """What the data sheet of an actuator says, SI units.
+class ActuatorQuestion(NamedTuple):
+    """What is asked, how an answer is read, and what stands for none; None: it must be answered."""
 
-    Attributes
+    name: str
+    words: str
+    example: str
+    read: Callable[[str], Any]
+    default: str | None = ""
+
+
+def _choice(name: str, words: str, *choices: str) -> ActuatorQuestion:
+    """Ask for one of two words, or its beginning; the first is the default."""
+
+    def chosen(text: str) -> str:
+        close = [word for word in choices if text and word.startswith(text.strip().lower())]
+        if len(close) != 1:
+            raise ValueError(f"{text[:40]!r}: choose {' or '.join(choices)}")
+        return close[0]
+
+    return ActuatorQuestion(name, words, ", ".join(choices), chosen, choices[0])
+
+
+_area, _length = partial(quantity, units=AREA), partial(quantity, units=LENGTH)
+_mass, _pressures = partial(quantity, units=MASS), partial(span, units=PRESSURE)
+
+QUESTIONS = (
+    ActuatorQuestion("tag", "tag of the valve", "FV-101", str),
+    ActuatorQuestion(
+        "area", "effective area of the diaphragm or piston", "690 cm2, 107 in2", _area, None
+    ),
+    ActuatorQuestion("travel", "travel of the stem", "28.6 mm, 1.125 in", _length, None),
+    _choice("acting", "acting", "single", "double"),
+    ActuatorQuestion("opposing_area", "area of the other side, that of the rod", "650 cm2", _area),
+    ActuatorQuestion(
+        "spring_range", "spring range (bench set)", "0.2..1.0 bar, 3..15 psi", _pressures
+    ),
+    _choice("air_to", "more air on the actuator will", "open", "close"),
+    _choice(
+        "position",
+        "the position is that of the plug (0: closed), or of the stem (rising with the pressure)",
+        "plug",
+        "stem",
+    ),
+    _choice("sensor", "pressure sensor", "gauge", "absolute"),
+    ActuatorQuestion("sensor_range", "range of the sensor", "0..7 bar", _pressures),
+    ActuatorQuestion("mass", "mass of the moving parts", "1.6 kg", _mass),
+)
+
+_Entry = tuple[str, Any, str]
+"""Key, value and comment of a line of the file."""
+
+
+def _valve(answers: Mapping[str, Any]) -> Iterator[_Entry]:
+    area, travel = answers["area"], answers["travel"]
+    if answers.get("tag"):
+        yield "valve_tag", answers["tag"], ""
+    yield "diaphragm_area", area, f"m², {area * 1e4:.4g} cm²"
+    sensor = answers["sensor"]
+    reference = _ATMOSPHERE if sensor == "absolute" else 0.0
+    yield "pressure_reference", reference, f"Pa, {sensor} sensor"
+    yield "travel", travel, f"m, {travel * 1e3:.6g} mm"
+    if answers["air_to"] == "close":
+        yield "air_to", "close", "which end of the travel is the seat"
+    if answers.get("sensor_range") is not None:
+        low, high = answers["sensor_range"]
+        yield "pressure_minimum", low, f"Pa, {low / 1e5:.4g} bar: range of the sensor"
+        yield "pressure_maximum", high, f"Pa, {high / 1e5:.4g} bar"
+    if answers.get("mass") is not None:
+        yield "assumed_mass", answers["mass"], "kg, where a record does not tell it"
+    if answers.get("spring_range") is not None:
+        low, high = answers["spring_range"]
+        words = f"of the spring range {low / 1e5:.4g} to {high / 1e5:.4g} bar"
+        yield "spring_constant", area * (high - low) / travel, f"N/m, {words}"
+        yield "spring_preload", area * low, f"N, {words}"
+    elif answers["acting"] == "double":
+        yield "fixed.spring_constant", 0.0, "N/m, assumed: no spring range was given"
+
+
+def _columns(answers: Mapping[str, Any], given: Mapping[str, Any]) -> Iterator[_Entry]:
+    """Yield what is said of the tables, and then what follows of the actuator."""
+    yield from ((name, value, "") for name, value in given.items())
+    found: list[_Entry] = []
+    if answers["air_to"] == "close" and answers["position"] == "plug":
+        found.append(("inverted_position", True, ""))
+    if answers["acting"] == "double":
+        words = "assumed: the header of the other side's pressure"
+        found.append(("opposing_pressure_column", "opposing_pressure_pa", words))
+        other, words = answers["opposing_area"], ""
+        if other is None:
+            other, words = answers["area"], "assumed: both sides have the same area"
+        found.append(("opposing_area_ratio", other / answers["area"], words))
+    yield from (each for each in found if each[0] not in given)
+
+
+def valve_description(answers: Mapping[str, Any], columns: Mapping[str, Any]) -> str:
+    """Return the text of a valve file.
+
+    Parameters
     ----------
-    area, travel : float
-        Effective area, m², and travel, m.
-    spring_range : tuple of float, optional
-        Gauge pressures at which the stem begins and ends its travel without friction (bench set),
-        Pa.
-    is_absolute : bool
-        The sensor reads absolute pressure.
-    sensor_range : tuple of float, optional
-        What the sensor reads, Pa.
-    is_air_to_close : bool
-        More pressure closes the valve.
-    position_is_opening : bool
-        The position is that of the plug, 0 where it is closed; else it rises with the pressure.
-    opposing_area : float, optional
-        Area of the other side of a double-acting actuator, m².
-    opposing_area_is_assumed : bool
-        That area is a guess, which the file says.
-    mass : float, optional
-        Mass of the moving parts, kg.
-    tag : str
-        Tag of the valve.
+    answers : mapping of str to object
+        The answers by the names of `QUESTIONS`, in SI units; None stands for none, and only area,
+        travel, and those with a choice need be there.
     columns : mapping of str to object
-        How its tables are written, by the names of `Columns`.
+        How tables of the valve are written, by the names of `Columns`.
     """
-
-    area: float
-    travel: float
-    spring_range: tuple[float, float] | None = None
-    is_absolute: bool = False
-    sensor_range: tuple[float, float] | None = None
-    is_air_to_close: bool = False
-    position_is_opening: bool = True
-    opposing_area: float | None = None
-    opposing_area_is_assumed: bool = False
-    mass: float | None = None
-    tag: str = ""
-    columns: Mapping[str, Any] = field(default_factory=dict)
-
-    def _valve(self) -> Iterator[tuple[str, Any, str]]:
-        if self.tag:
-            yield "valve_tag", self.tag, ""
-        yield "diaphragm_area", self.area, f"m², {self.area * 1e4:.4g} cm²"
-        yield (
-            "pressure_reference",
-            _ATMOSPHERE if self.is_absolute else 0.0,
-            f"Pa, {'absolute' if self.is_absolute else 'gauge'} sensor",
-        )
-        yield "travel", self.travel, f"m, {self.travel * 1e3:.6g} mm"
-        if self.is_air_to_close:
-            yield "air_to", "close", "which end of the travel is the seat"
-        if self.sensor_range is not None:
-            low, high = self.sensor_range
-            yield "pressure_minimum", low, f"Pa, {low / 1e5:.4g} bar: range of the sensor"
-            yield "pressure_maximum", high, f"Pa, {high / 1e5:.4g} bar"
-        if self.mass is not None:
-            yield "assumed_mass", self.mass, "kg, where a record does not tell it"
-
-    def _spring(self) -> Iterator[tuple[str, Any, str]]:
-        if self.spring_range is not None:
-            low, high = self.spring_range
-            words = f"of the spring range {low / 1e5:.4g} to {high / 1e5:.4g} bar"
-            yield "spring_constant", self.area * (high - low) / self.travel, f"N/m, {words}"
-            yield "spring_preload", self.area * low, f"N, {words}"
-        elif self.opposing_area is not None:
-            yield "fixed.spring_constant", 0.0, "N/m, assumed: no spring range was given"
-
-    def _columns(self) -> dict[str, Any]:
-        columns = dict(self.columns)
-        if self.is_air_to_close and self.position_is_opening:
-            columns.setdefault("inverted_position", True)
-        if self.opposing_area is not None:
-            columns.setdefault("opposing_pressure_column", "opposing_pressure_pa")
-            columns.setdefault("opposing_area_ratio", self.opposing_area / self.area)
-        return columns
-
-    def _assumed(self) -> dict[str, str]:
-        """Return the comments on what nobody said."""
-        if self.opposing_area is None:
-            return {}
-        assumed = {"opposing_pressure_column": "assumed: the header of the other side's pressure"}
-        if self.opposing_area_is_assumed:
-            assumed["opposing_area_ratio"] = "assumed: both sides have the same area"
-        return {name: words for name, words in assumed.items() if name not in self.columns}
-
-    def text(self) -> str:
-        """Return the valve file."""
-        lines = [
-            "# A valve for `valve_friction ... --valve`, and for nodes by --params-file; commands",
-            "# read it with or without the first two lines, which ROS 2 wants. SI units.",
-            f"# Air to {'close' if self.is_air_to_close else 'open'}, "
-            f"{'single' if self.opposing_area is None else 'double'}-acting.",
-            "/**:",
-            "  ros__parameters:",
-        ]
-        for name, value, comment in (*self._valve(), *self._spring()):
-            lines.append(_line(name, value, comment))
-        if columns := self._columns():
-            lines += ["", "    columns:  # how its tables are written"]
-            assumed = self._assumed()
-            lines += [
-                f"  {_line(name, value, assumed.get(name, ''))}" for name, value in columns.items()
-            ]
-        return "\n".join(lines) + "\n"
+    lines = [
+        "# A valve for `valve_friction ... --valve`, and for nodes by --params-file; commands",
+        "# read it with or without the first two lines, which ROS 2 wants. SI units.",
+        f"# Air to {answers['air_to']}, {answers['acting']}-acting.",
+        "/**:",
+        "  ros__parameters:",
+        *(_line(*each) for each in _valve(answers)),
+    ]
+    if of_tables := [f"  {_line(*each)}" for each in _columns(answers, columns)]:
+        lines += ["", "    columns:  # how its tables are written", *of_tables]
+    return "\n".join(lines) + "\n"
 
 
 def _line(name: str, value: object, comment: str) -> str:

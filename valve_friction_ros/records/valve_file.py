@@ -18,16 +18,12 @@ from typing import Any
 
 import yaml
 
-from valve_friction_ros.identification import (
-    FIXABLE,
-    STATED,
-    require_valve_units,
-)
+from valve_friction_ros.identification import FIXABLE, STATED, require_valve_units
 from valve_friction_ros.model import KarnoppParameters, Valve
 from valve_friction_ros.model.checks import frozen
+from valve_friction_ros.outside_text import nearest, resembling
 from valve_friction_ros.records.columns import Columns
-from valve_friction_ros.records.spelling import nearest, resembling
-from valve_friction_ros.records.whole_file import cause_of
+from valve_friction_ros.records.files import cause_of
 from valve_friction_ros.settings import (
     COLUMNS,
     IDENTIFICATION,
@@ -73,8 +69,7 @@ def read_yaml(path: Path) -> Any:
     except RecursionError:
         raise ValueError(f"{path}: not YAML of a valve: it is nested too deeply") from None
     except (OSError, ValueError) as error:
-        cause = cause_of(error)
-        raise ValueError(f"{path}: cannot be read: {cause}") from None
+        raise ValueError(f"{path}: cannot be read: {cause_of(error)}") from None
 
 
 _BLOCK = "ros__parameters"
@@ -179,10 +174,6 @@ def _of_node(content: Mapping[Any, Any], valve: str | None) -> Mapping[Any, Any]
     else:
         chosen = next(iter(own.values()), {})
     return {**merged, **chosen}
-
-
-def _is_of_nodes(content: Mapping[Any, Any]) -> bool:
-    return any(True for _ in _blocks(content))
 
 
 def _flat(content: Mapping[Any, Any], is_shared: bool) -> dict[str, Any]:
@@ -338,10 +329,8 @@ def valve_file_of(content: object, path: Path, valve: str | None = None) -> Valv
     try:
         if not isinstance(content, dict):
             raise ValueError("expected lines such as 'diaphragm_area: 0.0445'")
-        if _is_of_nodes(content):
-            values = _flat(_of_node(content, valve), is_shared=True)
-        else:
-            values = _flat(content, is_shared=False)
+        is_of_nodes = any(True for _ in _blocks(content))
+        values = _flat(_of_node(content, valve) if is_of_nodes else content, is_of_nodes)
         if "diaphragm_area" not in values:
             raise ValueError(
                 "diaphragm_area is missing: add a line such as 'diaphragm_area: 0.0445'"

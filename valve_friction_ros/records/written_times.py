@@ -13,7 +13,7 @@ import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timezone
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -103,24 +103,13 @@ class TimeForm:
     origin: int = 0
     has_zone: bool = False
 
-    @property
-    def is_date(self) -> bool:
-        """True for dates."""
-        return bool(self.formats)
 
-
-@dataclass(frozen=True)
-class DateForms:
+class DateForms(NamedTuple):
     """What the dates of a column can be: formats with the day first, with the month first."""
 
     day_first: tuple[str, ...]
     month_first: tuple[str, ...]
     has_zone: bool
-
-    @property
-    def is_ambiguous(self) -> bool:
-        """True if the texts do not show whether the day or the month comes first."""
-        return bool(self.day_first) and bool(self.month_first)
 
 
 def date_forms(texts: Sequence[str]) -> DateForms | None:

@@ -25,7 +25,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from valve_friction_ros.page_template import page_environment
-from valve_friction_ros.records.whole_file import write_whole
+from valve_friction_ros.records.files import write_whole
 
 _SYMBOL = re.compile(r"(?<![\w.])([FPRSTakv]|σ|R²)_(ref|[a-z0-9])(?!\w|\.\w)")
 _MINUS = re.compile(r"(?<![\w.-])-(?=\d)")

@@ -8,3 +8,47 @@
 # language governing permissions and limitations under the License.
 
 """Arguments that sub-commands share, and what they stand for."""
+
+import argparse
+import math
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+_OPTION = re.compile(r"^ *(--[a-z-]+)(?: (\S+)|): ", re.MULTILINE)
+
+
+def add_options(parser: argparse._ActionsContainer, text: str, **more: Mapping[str, Any]) -> None:
+    """Declare options as their help shows them.
+
+    Parameters
+    ----------
+    parser : ArgumentParser, or a group of one
+        What takes them.
+    text : str
+        Each option on lines of its own, as ``--plot FILE.png: draw it``. Without a word for what it
+        takes it is a flag. It takes a path where that word is FILE, DIR or FOLDER, or has an
+        ending, and otherwise a text, unless `more` says more.
+    **more
+        Further keywords of `add_argument` by the name of the option, as ``jobs={"type": int}``.
+    """
+    _, *parts = _OPTION.split(text)
+    for name, takes, words in zip(parts[::3], parts[1::3], parts[2::3], strict=True):
+        told: dict[str, Any] = {"action": "store_true"}
+        if takes:
+            is_place = "." in takes or takes in ("FILE", "DIR", "FOLDER")
+            told = {"type": Path if is_place else str, "metavar": takes}
+        told |= more.get(name[2:].replace("-", "_"), {})
+        parser.add_argument(name, help=" ".join(words.split()), **told)
+
+
+def percent(text: str, least: float = -math.inf, words: str = ", such as 90") -> float:
+    """Read a percentage of at most 100, and at least `least` times 100; return the share."""
+    try:
+        share = float(text.rstrip(" %")) / 100
+    except ValueError:
+        share = math.nan
+    if not least <= share <= 1:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a percentage{words}")
+    return share

@@ -14,20 +14,18 @@ imported when its arguments have been read.
 """
 
 import argparse
-import math
+import os
 from collections.abc import Callable, Mapping
 from datetime import datetime, timedelta, timezone
 from pathlib import Path
 from types import MappingProxyType
 
-from valve_friction_ros.commands.arguments.actuator_questions import QUESTIONS
-from valve_friction_ros.commands.arguments.fail_on import add_fail_on
-from valve_friction_ros.commands.arguments.identification import add_identification_arguments
-from valve_friction_ros.commands.arguments.kept_valves import (
+from valve_friction_ros.commands.arguments import add_options, percent
+from valve_friction_ros.commands.arguments.identification import (
     PLACE,
-    add_valve_argument,
+    add_fail_on,
+    add_identification_arguments,
     history_place,
-    usual_history,
 )
 from valve_friction_ros.commands.arguments.planning import add_planning_arguments
 from valve_friction_ros.commands.arguments.recording import (
@@ -38,54 +36,9 @@ from valve_friction_ros.commands.arguments.recording import (
 from valve_friction_ros.dashboard.accounts import Role
 from valve_friction_ros.history import URL_VARIABLE
 from valve_friction_ros.identification import LEAST_FIT
-from valve_friction_ros.records.data_folder import history_file
-from valve_friction_ros.records.spelling import nearest
-
-
-def _add_files(parser: argparse.ArgumentParser) -> None:
-    """Declare the picture, the report, and the baseline that friction is compared with."""
-    parser.add_argument("--plot", type=Path, metavar="FILE.png", help="draw the identification")
-    parser.add_argument(
-        "--report",
-        type=Path,
-        metavar="FILE.html",
-        help="write a page for people, one file: diagnosis, parameters, pictures, settings",
-    )
-    parser.add_argument(
-        "--baseline-coulomb-friction",
-        type=float,
-        metavar="N",
-        help="F_c of this valve when it was healthy; its diagnosis compares with it",
-    )
-    parser.add_argument(
-        "--baseline-half-width",
-        type=float,
-        metavar="N",
-        help="half width of the 95 %% interval of the baseline (0: exact)",
-    )
-    parser.add_argument(
-        "--baseline-recording",
-        type=Path,
-        metavar="FILE",
-        help="recording of this valve when it was healthy, read and identified with the same "
-        "options; its friction is the baseline, and --report draws its signature",
-    )
-
-
-def _add_sharing(parser: argparse.ArgumentParser) -> None:
-    """Declare the number of processes, or the cluster."""
-    parser.add_argument(
-        "--jobs",
-        type=int,
-        metavar="N",
-        help="number of recordings identified in parallel, one process each (one per core)",
-    )
-    parser.add_argument(
-        "--scheduler",
-        metavar="ADDRESS",
-        help="use the workers of a Dask cluster, which must see DIR under the same path, instead "
-        "of local processes; tcp://host:8786 or tls://host:8786 (extra `cluster`)",
-    )
+from valve_friction_ros.outside_text import nearest
+from valve_friction_ros.records.files import history_file
+from valve_friction_ros.records.valve_description import QUESTIONS
 
 
 def _identify(parser: argparse.ArgumentParser) -> None:
@@ -98,9 +51,23 @@ def _identify(parser: argparse.ArgumentParser) -> None:
     )
     add_recording_arguments(parser)
     add_identification_arguments(parser)
-    _add_files(parser)
+    add_options(
+        parser,
+        """
+        --plot FILE.png: draw the identification
+        --report FILE.html: write a page for people, one file: diagnosis, parameters, pictures,
+            settings
+        --baseline-coulomb-friction N: F_c of this valve when it was healthy; its diagnosis compares
+            with it
+        --baseline-half-width N: half width of the 95 %% interval of the baseline (0: exact)
+        --baseline-recording FILE: recording of this valve when it was healthy, read and identified
+            with the same options; its friction is the baseline, and --report draws its signature
+        """,
+        baseline_coulomb_friction={"type": float},
+        baseline_half_width={"type": float},
+    )
     add_fail_on(parser)
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    add_options(parser, "--json: print one JSON object")
 
 
 def _inspect(parser: argparse.ArgumentParser) -> None:
@@ -113,8 +80,7 @@ def _inspect(parser: argparse.ArgumentParser) -> None:
         "settles it."
     )
     add_recording_arguments(parser)
-    parser.add_argument("--plot", type=Path, metavar="FILE.png", help="draw the recording")
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    add_options(parser, "--plot FILE.png: draw the recording\n--json: print one JSON object")
 
 
 def _identify_folder(parser: argparse.ArgumentParser) -> None:
@@ -133,65 +99,40 @@ def _identify_folder(parser: argparse.ArgumentParser) -> None:
         help="folder of the recordings, or s3://bucket/folder and other stores named as in fsspec "
         "(extra `stores`)",
     )
-    parser.add_argument(
-        "--output",
-        type=Path,
-        action="append",
-        required=True,
-        metavar="FILE",
-        help="FILE.csv, FILE.jsonl (JSON lines) or FILE.html (a page that ranks the valves), "
-        "written at the end and on interruption; may be repeated; until then FILE.sqlite holds the "
-        "rows in the order in which they were finished",
-    )
-    parser.add_argument(
-        "--no-reports",
-        action="store_true",
-        help="with FILE.html: write no page per valve in the folder FILE_reports, which takes a "
-        "second and half a megabyte each",
-    )
-    parser.add_argument(
-        "--baselines",
-        type=Path,
-        metavar="FILE.csv",
-        help="friction of the healthy valves, with which the diagnosis compares: an earlier output "
-        "of this command for a folder with the same names, or a table with the columns recording "
-        "(empty: any), valve and coulomb_friction_n",
+    add_options(
+        parser,
+        """
+        --output FILE: FILE.csv, FILE.jsonl (JSON lines) or FILE.html (a page that ranks the
+            valves), written at the end and on interruption; may be repeated; until then FILE.sqlite
+            holds the rows in the order in which they were finished
+        --no-reports: with FILE.html: write no page per valve in the folder FILE_reports, which
+            takes a second and half a megabyte each
+        --baselines FILE.csv: friction of the healthy valves, with which the diagnosis compares: an
+            earlier output of this command for a folder with the same names, or a table with the
+            columns recording (empty: any), valve and coulomb_friction_n
+        """,
+        output={"action": "append", "required": True},
     )
     add_fail_on(parser)
-    parser.add_argument(
-        "--valve",
-        type=Path,
-        metavar="FILE.yaml",
-        help="valve file for recordings that have neither NAME.valve.yaml beside them nor "
-        "valve.yaml in their bag or beside them",
-    )
-    parser.add_argument(
-        "--plant",
-        type=Path,
-        metavar="FILE.csv",
-        help="table of the valves: tag, area, travel, spring, range; a recording belongs to the "
-        "valve whose tag appears in its file name or above its values",
-    )
-    parser.add_argument(
-        "--history",
-        type=Path,
-        metavar="FILE.sqlite",
-        help="with --plant: store each result under its tag and the time of its recording, and "
-        "compare it with the baseline stored there; `history` and the dashboard read it",
-    )
-    parser.add_argument(
-        "--first-is-baseline",
-        action="store_true",
-        help="with --history: take the first result of a valve without a baseline as its baseline",
-    )
-    _add_sharing(parser)
-    parser.add_argument(
-        "--retry-failed",
-        action="store_true",
-        help="identify again the recordings that were refused before",
-    )
-    parser.add_argument(
-        "--redo", action="store_true", help="replace rows that were computed with other options"
+    add_options(
+        parser,
+        """
+        --valve FILE.yaml: valve file for recordings that have neither NAME.valve.yaml beside them
+            nor valve.yaml in their bag or beside them
+        --plant FILE.csv: table of the valves: tag, area, travel, spring, range; a recording belongs
+            to the valve whose tag appears in its file name or above its values
+        --history FILE.sqlite: with --plant: store each result under its tag and the time of its
+            recording, and compare it with the baseline stored there; `history` and the dashboard
+            read it
+        --first-is-baseline: with --history: take the first result of a valve without a baseline as
+            its baseline
+        --jobs N: number of recordings identified in parallel, one process each (one per core)
+        --scheduler ADDRESS: use the workers of a Dask cluster, which must see DIR under the same
+            path, instead of local processes; tcp://host:8786 or tls://host:8786 (extra `cluster`)
+        --retry-failed: identify again the recordings that were refused before
+        --redo: replace rows that were computed with other options
+        """,
+        jobs={"type": int},
     )
     add_identification_arguments(parser)
     add_reading_arguments(parser)
@@ -203,11 +144,14 @@ def _describe_valve(parser: argparse.ArgumentParser) -> None:
         "for what is required."
     )
     parser.epilog = "Exit code 2: an answer is missing or impossible, or the file was not written."
-    parser.add_argument(
-        "--output", type=Path, metavar="FILE.yaml", help="valve file (standard output)"
+    add_options(
+        parser,
+        """
+        --output FILE.yaml: valve file (standard output)
+        --replace: overwrite an existing file
+        --yes: take the defaults instead of asking
+        """,
     )
-    parser.add_argument("--replace", action="store_true", help="overwrite an existing file")
-    parser.add_argument("--yes", action="store_true", help="take the defaults instead of asking")
     for each in QUESTIONS:
         parser.add_argument(
             f"--{each.name.replace('_', '-')}",
@@ -228,56 +172,30 @@ def _plan_test(parser: argparse.ArgumentParser) -> None:
         "option was refused, no test within the limits determines the friction, or a file could "
         "not be written."
     )
-    parser.add_argument(
-        "--valve", type=Path, required=True, metavar="VALVE.yaml", help="the valve file"
-    )
-    parser.add_argument(
-        "--valve-name",
-        metavar="NAME",
-        help="which of several valves in the valve file or in --history",
+    add_options(
+        parser,
+        """
+        --valve VALVE.yaml: the valve file
+        --valve-name NAME: which of several valves in the valve file or in --history
+        """,
+        valve={"required": True},
     )
     add_planning_arguments(parser)
-    parser.add_argument(
-        "--output",
-        type=Path,
-        default=Path("stroke_test.csv"),
-        metavar="FILE.csv",
-        help="corners of the pressure signal: time_s and pressure_pa (%(default)s)",
+    add_options(
+        parser,
+        """
+        --output FILE.csv: corners of the pressure signal: time_s and pressure_pa (%(default)s)
+        --table FILE.csv: set points with their times in %%, mA, kPa and bar, abort positions, and
+            what each step determines: for a control system without ROS
+        --form FILE.txt: the same as a partial-stroke test form, for a person with a stopwatch
+        --signal-range RANGE: pressures at 0 and 100 %% signal, such as '0.2..1.0 bar' (the spring
+            range)
+        --replace: overwrite an existing file
+        --figure FILE.png: draw pressure and expected stem
+        --json: print one JSON object
+        """,
+        output={"default": Path("stroke_test.csv")},
     )
-    parser.add_argument(
-        "--table",
-        type=Path,
-        metavar="FILE.csv",
-        help="set points with their times in %%, mA, kPa and bar, abort positions, and what each "
-        "step determines: for a control system without ROS",
-    )
-    parser.add_argument(
-        "--form",
-        type=Path,
-        metavar="FILE.txt",
-        help="the same as a partial-stroke test form, for a person with a stopwatch",
-    )
-    parser.add_argument(
-        "--signal-range",
-        metavar="RANGE",
-        help="pressures at 0 and 100 %% signal, such as '0.2..1.0 bar' (the spring range)",
-    )
-    parser.add_argument("--replace", action="store_true", help="overwrite an existing file")
-    parser.add_argument(
-        "--figure", type=Path, metavar="FILE.png", help="draw pressure and expected stem"
-    )
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
-
-
-def _percent(text: str) -> float:
-    """Read a percentage of at most 100; return the share."""
-    try:
-        share = float(text.rstrip(" %")) / 100
-    except ValueError:
-        share = math.nan
-    if not share <= 1:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a percentage, such as 90")
-    return share
 
 
 def _validate(parser: argparse.ArgumentParser) -> None:
@@ -290,22 +208,18 @@ def _validate(parser: argparse.ArgumentParser) -> None:
         "could not be written; 3: the fit is below --fail-below."
     )
     add_recording_arguments(parser)
-    parser.add_argument(
-        "--estimate",
-        type=Path,
-        required=True,
-        metavar="ESTIMATE.json",
-        help="the model, as `valve_friction identify --json` prints it",
+    add_options(
+        parser,
+        f"""
+        --estimate ESTIMATE.json: the model, as `valve_friction identify --json` prints it
+        --fail-below PERCENT: exit with code 3 if the fit is below this; a fit below
+            {100 * LEAST_FIT:g} is always called poor
+        --plot FILE.png: plot both stem positions
+        --json: print one JSON object
+        """,
+        estimate={"required": True},
+        fail_below={"type": percent},
     )
-    parser.add_argument(
-        "--fail-below",
-        type=_percent,
-        metavar="PERCENT",
-        help="exit with code 3 if the fit is below this; a fit below "
-        f"{100 * LEAST_FIT:g} is always called poor",
-    )
-    parser.add_argument("--plot", type=Path, metavar="FILE.png", help="plot both stem positions")
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
 
 
 SERVICES = {
@@ -317,9 +231,6 @@ SERVICES = {
     "clear": "empty the buffer",
     "reset_usage": "reset the usage counters, after the packing was replaced",
 }
-
-
-_ANSWER_TIMEOUT = 300.0
 
 
 def _service(name: str) -> str:
@@ -342,19 +253,15 @@ def _call(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("valve", metavar="VALVE", help="namespace of the valve, such as /fv_101")
     parser.add_argument("service", type=_service, metavar="SERVICE", help="one of the above")
-    parser.add_argument(
-        "--timeout",
-        type=float,
-        default=_ANSWER_TIMEOUT,
-        metavar="S",
-        help="time to wait for the answer (%(default)g)",
+    add_options(
+        parser,
+        "--timeout S: time to wait for the answer (%(default)g)",
+        timeout={"type": float, "default": 300.0},
     )
     add_fail_on(parser)
 
 
 EARLIEST = datetime(1970, 1, 1, tzinfo=timezone.utc)
-
-
 LATEST = datetime(2262, 1, 1, tzinfo=timezone.utc)
 """Nanoseconds since 1970 of a later year may not fit a signed 64-bit integer."""
 
@@ -379,12 +286,23 @@ def _until(text: str) -> datetime:
     return min(_time(text) + timedelta(days=is_date), LATEST)
 
 
+def _add_valves(parser: argparse.ArgumentParser) -> None:
+    add_options(
+        parser,
+        """
+        --valve NAME: only this valve: its tag, its namespace, or the name of its identifier; may be
+            repeated
+        """,
+        valve={"action": "append"},
+    )
+
+
 def _add_history(parser: argparse.ArgumentParser, words: str) -> None:
     parser.add_argument(
         "file",
         type=history_place,
         nargs="?",
-        default=usual_history(),
+        default=os.environ.get(URL_VARIABLE, "").strip() or str(history_file()),
         metavar=PLACE,
         help=f"{words} (that of {URL_VARIABLE}, else {history_file()})",
     )
@@ -400,26 +318,21 @@ def _history(parser: argparse.ArgumentParser) -> None:
         "figure could not be written; 3: the latest diagnosis of a valve reached --fail-on."
     )
     _add_history(parser, "the identifiers' history_file, or the server of their history_url")
-    add_valve_argument(parser)
-    parser.add_argument(
-        "--since", type=_time, default=EARLIEST, metavar="TIME", help="only from this time on"
-    )
-    parser.add_argument(
-        "--until",
-        type=_until,
-        default=LATEST,
-        metavar="TIME",
-        help="only before this time; a date includes its whole day",
-    )
-    parser.add_argument("--csv", type=Path, metavar="FILE.csv", help="write the list as a table")
-    parser.add_argument("--plot", type=Path, metavar="FILE.png", help="plot friction over time")
-    parser.add_argument(
-        "--usage",
-        action="store_true",
-        help="list distance, reversals, breakaways and times per day instead of identifications",
+    _add_valves(parser)
+    add_options(
+        parser,
+        """
+        --since TIME: only from this time on
+        --until TIME: only before this time; a date includes its whole day
+        --csv FILE.csv: write the list as a table
+        --plot FILE.png: plot friction over time
+        --usage: list distance, reversals, breakaways and times per day instead of identifications
+        """,
+        since={"type": _time, "default": EARLIEST},
+        until={"type": _until, "default": LATEST},
     )
     add_fail_on(parser)
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    add_options(parser, "--json: print one JSON object")
 
 
 def _history_copy(parser: argparse.ArgumentParser) -> None:
@@ -439,8 +352,8 @@ def _history_copy(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "target", type=history_place, metavar="TO", help="the target; created if it does not exist"
     )
-    add_valve_argument(parser)
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    _add_valves(parser)
+    add_options(parser, "--json: print one JSON object")
 
 
 def _dashboard(parser: argparse.ArgumentParser) -> None:
@@ -454,34 +367,20 @@ def _dashboard(parser: argparse.ArgumentParser) -> None:
         "not allowed."
     )
     _add_history(parser, "the history of `identify-folder --history` or of the identifiers")
-    parser.add_argument(
-        "--time-zone",
-        default="UTC",
-        metavar="ZONE",
-        help="time zone, such as Europe/Berlin (%(default)s)",
-    )
-    parser.add_argument(
-        "--reports",
-        type=Path,
-        metavar="DIR",
-        help="folder of reports that `identify-folder --output FILE.html` wrote: each valve page "
-        "links to its own",
-    )
-    parser.add_argument(
-        "--port", type=int, default=8080, metavar="N", help="port to listen on (%(default)s)"
-    )
-    parser.add_argument(
-        "--host",
-        default="127.0.0.1",
-        metavar="ADDRESS",
-        help="address to listen on; any other than loopback needs accounts (%(default)s)",
-    )
-    parser.add_argument(
-        "--accounts",
-        type=Path,
-        metavar="FILE",
-        help="accounts file made with `valve_friction dashboard-account`; empty: from the "
-        "environment",
+    add_options(
+        parser,
+        """
+        --time-zone ZONE: time zone, such as Europe/Berlin (%(default)s)
+        --reports DIR: folder of reports that `identify-folder --output FILE.html` wrote: each valve
+            page links to its own
+        --port N: port to listen on (%(default)s)
+        --host ADDRESS: address to listen on; any other than loopback needs accounts (%(default)s)
+        --accounts FILE: accounts file made with `valve_friction dashboard-account`; empty: from the
+            environment
+        """,
+        time_zone={"default": "UTC"},
+        port={"type": int, "default": 8080},
+        host={"default": "127.0.0.1"},
     )
 
 
@@ -514,34 +413,22 @@ def _reproduce_paper(parser: argparse.ArgumentParser) -> None:
         "matches and names what does not match."
     )
     parser.epilog = "Exit code 0: the report is written, whatever matched; 2: it is not."
-    parser.add_argument(
-        "--output",
-        type=Path,
-        default=Path("reproduction"),
-        metavar="FOLDER",
-        help="output folder (%(default)s)",
-    )
-    parser.add_argument(
-        "--config",
-        type=Path,
-        metavar="FOLDER",
-        help="folder with bench_low.yaml, bench_high.yaml and bench_graphite.yaml (those of the "
-        "package)",
-    )
-    parser.add_argument(
-        "--position-noise-um",
-        type=float,
-        metavar="UM",
-        help="standard deviation of the stem sensor, µm, instead of the configured one",
-    )
-    parser.add_argument(
-        "--pressure-noise-pa",
-        type=float,
-        metavar="PA",
-        help="standard deviation of the pressure sensor, Pa, instead of the configured one",
-    )
-    parser.add_argument(
-        "--seed", type=int, default=0, metavar="N", help="seed of the noise (%(default)s)"
+    add_options(
+        parser,
+        """
+        --output FOLDER: output folder (%(default)s)
+        --config FOLDER: folder with bench_low.yaml, bench_high.yaml and bench_graphite.yaml (those
+            of the package)
+        --position-noise-um UM: standard deviation of the stem sensor, µm, instead of the configured
+            one
+        --pressure-noise-pa PA: standard deviation of the pressure sensor, Pa, instead of the
+            configured one
+        --seed N: seed of the noise (%(default)s)
+        """,
+        output={"default": Path("reproduction")},
+        position_noise_um={"type": float},
+        pressure_noise_pa={"type": float},
+        seed={"type": int, "default": 0},
     )
 
 
@@ -554,17 +441,14 @@ def _demo(parser: argparse.ArgumentParser) -> None:
         "Exit code 0: all numbers are within tolerance, and the excess friction was diagnosed; 1: "
         "they are not, or it was not; 2: the bench did not run, or the figure could not be written."
     )
-    parser.add_argument(
-        "--output",
-        type=Path,
-        default=Path("valve_friction_demo.png"),
-        metavar="FILE.png",
-        help="figure of the result (%(default)s)",
-    )
-    parser.add_argument(
-        "--dashboard",
-        action="store_true",
-        help="show three valves, healthy, tightening and leaking, on the dashboard until Ctrl-C",
+    add_options(
+        parser,
+        """
+        --output FILE.png: figure of the result (%(default)s)
+        --dashboard: show three valves, healthy, tightening and leaking, on the dashboard until
+            Ctrl-C
+        """,
+        output={"default": Path("valve_friction_demo.png")},
     )
 
 

@@ -7,18 +7,24 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Arguments of the commands that identify: the method and its settings."""
+"""Arguments on what is identified, or was: settings, ``--fail-on``, a history, an estimate."""
 
 import argparse
-from collections.abc import Mapping, Sequence
+import json
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from valve_friction_ros.history import HistoryServer, is_url
+from valve_friction_ros.identification import PARAMETER_UNITS
 from valve_friction_ros.identification.settings import (
     DEFAULT_METHOD,
     FIXABLE,
     IdentificationSettings,
 )
-from valve_friction_ros.records.spelling import nearest, resembling
+from valve_friction_ros.outside_text import nearest, resembling
+from valve_friction_ros.records.files import cause_of
 from valve_friction_ros.settings import (
     IDENTIFICATION,
     SURVEY,
@@ -27,7 +33,8 @@ from valve_friction_ros.settings import (
 )
 
 if TYPE_CHECKING:
-    from valve_friction_ros.health import FrictionLimits
+    from valve_friction_ros.health import FrictionLimits, Level
+    from valve_friction_ros.history import KeptValve
     from valve_friction_ros.records.valve_file import ValveFile
 
 _NUMBERS = {int: "N", float: "SHARE"}
@@ -121,3 +128,110 @@ def survey_limits(options: argparse.Namespace, described: "ValveFile") -> "Frict
     return FrictionLimits(
         survey=SurveyLimits.of_packing(**survey_from({**described.survey, **stated}))
     )
+
+
+def add_fail_on(parser: argparse.ArgumentParser) -> None:
+    """Declare the level from which a diagnosis fails the command."""
+    parser.add_argument(
+        "--fail-on",
+        choices=("warn", "error"),
+        help="exit code 3 if a diagnosis is as severe as this, or more; without a baseline no "
+        "friction is compared, which raises no alarm",
+    )
+
+
+def has_failed(options: argparse.Namespace, found: "Iterable[Level]") -> bool:
+    """Return whether ``--fail-on`` is given, and one of the levels reaches it."""
+    if options.fail_on is None:
+        return False
+    from valve_friction_ros.health import Level  # noqa: PLC0415 - slow to import
+
+    return any(one >= Level[options.fail_on.upper()] for one in found)
+
+
+PLACE = "FILE.sqlite|URL"
+"""How the help calls a history."""
+
+
+def history_place(text: str) -> Path | HistoryServer:
+    """Read a path, or the address of a server."""
+    if not is_url(text):
+        return Path(text)
+    try:
+        return HistoryServer(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+
+
+def _is_called(valve: "KeptValve", name: str) -> bool:
+    namespace = valve.name.rpartition("/")[0]
+    return name == valve.tag or f"/{name.strip('/')}" in (valve.name, namespace)
+
+
+def chosen_valves(
+    valves: "Sequence[KeptValve]", names: Sequence[str] | None, option: str
+) -> "tuple[KeptValve, ...]":
+    """Return the valves of these names: tag, namespace or identifier; all without names.
+
+    Raises ValueError, which names `option` and the valves, if there is no such valve.
+    """
+    if names is None:
+        return tuple(valves)
+    for name in names:
+        if not any(_is_called(valve, name) for valve in valves):
+            known = ", ".join(valve.name for valve in valves) or "none"
+            raise ValueError(f"{option} {name}: there is no such valve; there are {known}")
+    return tuple(valve for valve in valves if any(_is_called(valve, name) for name in names))
+
+
+_LARGEST = 10_000_000
+"""Most bytes of an estimate. Chosen: `identify --json` writes some ten thousand."""
+
+
+def _value(path: Path, name: str, entry: Any) -> float:
+    if not isinstance(entry, dict) or "value" not in entry:
+        raise ValueError(f"{path}: parameters.{name} has no value")
+    value = entry["value"]
+    if value is None:
+        return math.nan
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise ValueError(
+            f"{path}: parameters.{name}.value must be a number or null, got {value!r:.80}"
+        )
+    try:
+        return float(value)
+    except OverflowError:
+        raise ValueError(f"{path}: parameters.{name}.value is too large") from None
+
+
+def read_estimate(path: Path) -> dict[str, float]:
+    """Read the values by name from the JSON of `valve_friction identify`; nan: not identifiable.
+
+    Raises ValueError, one line with the file and what it lacks.
+    """
+    try:
+        with path.open("rb") as stream:
+            text = stream.read(_LARGEST + 1)
+        if len(text) > _LARGEST:
+            raise ValueError(f"more than {_LARGEST // 1_000_000} MB: no estimate is so long")
+        content = json.loads(text.decode("utf-8-sig"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise ValueError(f"{path}: cannot be read: {cause_of(error)}") from None
+    except json.JSONDecodeError as error:
+        raise ValueError(f"{path}: not JSON: {error}") from None
+    except RecursionError:
+        raise ValueError(f"{path}: not JSON of an estimate: it is nested too deeply") from None
+    except ValueError as error:  # too large, as a whole or a number of thousands of digits
+        raise ValueError(f"{path}: {error}") from None
+    if isinstance(content, dict) and "valves" in content:
+        raise ValueError(f"{path}: is of several valves: identify the one by --valve-name")
+    parameters = content.get("parameters") if isinstance(content, dict) else None
+    if not isinstance(parameters, dict):
+        raise ValueError(
+            f"{path}: there are no parameters: give what `valve_friction identify --json` wrote"
+        )
+    for name in parameters:
+        if name not in PARAMETER_UNITS:
+            hint = nearest(name, PARAMETER_UNITS)
+            raise ValueError(f"{path}: unknown parameter {name!r:.80}; {hint}")
+    return {name: _value(path, name, entry) for name, entry in parameters.items()}

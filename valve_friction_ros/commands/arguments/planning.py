@@ -12,11 +12,16 @@
 import argparse
 import math
 from collections.abc import Mapping
-from dataclasses import fields
-from pathlib import Path
+from functools import partial
 from typing import TYPE_CHECKING
 
-from valve_friction_ros.commands.arguments.kept_valves import PLACE, history_place
+from valve_friction_ros.commands.arguments import add_options, percent
+from valve_friction_ros.commands.arguments.identification import (
+    PLACE,
+    chosen_valves,
+    history_place,
+    read_estimate,
+)
 from valve_friction_ros.identification import (
     CALIBRATION,
     TIMING_UNCERTAINTY,
@@ -31,15 +36,7 @@ if TYPE_CHECKING:
     from valve_friction_ros.records.valve_file import ValveFile
 
 
-def _percent(text: str) -> float:
-    """Read a percentage from 0 to 100; return the share."""
-    try:
-        share = float(text.rstrip(" %")) / 100
-    except ValueError:
-        share = math.nan
-    if not 0 <= share <= 1:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a percentage of the travel, such as 40")
-    return share
+_percent = partial(percent, least=0.0, words=" of the travel, such as 40")
 
 
 def add_planning_arguments(parser: argparse.ArgumentParser) -> None:
@@ -63,18 +60,14 @@ def _add_known(parser: argparse.ArgumentParser) -> None:
         "file; without any friction, the plan covers light to heavy packings",
     )
     source = known.add_mutually_exclusive_group()
-    source.add_argument(
-        "--estimate",
-        type=Path,
-        metavar="ESTIMATE.json",
-        help="an earlier result, as `valve_friction identify --json` prints it",
-    )
-    source.add_argument(
-        "--history",
-        type=history_place,
-        metavar=PLACE,
-        help="the last identification in the identifiers' history_file, or on their server; "
-        "of several valves that of --valve-name",
+    add_options(
+        source,
+        f"""
+        --estimate ESTIMATE.json: an earlier result, as `valve_friction identify --json` prints it
+        --history {PLACE}: the last identification in the identifiers' history_file, or on their
+            server; of several valves that of --valve-name
+        """,
+        history={"type": history_place},
     )
     for name, unit in UNITS.items():
         known.add_argument(
@@ -83,38 +76,27 @@ def _add_known(parser: argparse.ArgumentParser) -> None:
             metavar=unit.upper().replace("·", "*"),
             help=f"{name}, {unit}",
         )
-    known.add_argument(
-        "--friction-factor",
-        type=float,
-        default=2.0,
-        metavar="FACTOR",
-        help="factor by which friction may be smaller or larger than stated (%(default)g)",
+    add_options(
+        known,
+        "--friction-factor FACTOR: factor by which friction may be smaller or larger than stated "
+        "(%(default)g)",
+        friction_factor={"type": float, "default": 2.0},
     )
 
 
 def _add_limits(parser: argparse.ArgumentParser) -> None:
     limits, default = parser.add_argument_group("limits", "what the test may do"), Limits()
-    limits.add_argument(
-        "--from",
-        dest="lowest",
-        type=_percent,
-        default=default.lowest,
-        metavar="PERCENT",
-        help=f"lowest position, in percent of travel ({100 * default.lowest:g})",
-    )
-    limits.add_argument(
-        "--to",
-        dest="highest",
-        type=_percent,
-        default=default.highest,
-        metavar="PERCENT",
-        help=f"highest position ({100 * default.highest:g})",
-    )
-    limits.add_argument(
-        "--allow-stops",
-        action="store_true",
-        help="let the stem reach seat and stop; otherwise even a stem without friction stays "
-        f"{100 * default.stop_margin:g} %% of travel away from them",
+    lowest = {"dest": "lowest", "type": _percent, "default": default.lowest}
+    add_options(
+        limits,
+        f"""
+        --from PERCENT: lowest position, in percent of travel ({100 * default.lowest:g})
+        --to PERCENT: highest position ({100 * default.highest:g})
+        --allow-stops: let the stem reach seat and stop; otherwise even a stem without friction
+            stays {100 * default.stop_margin:g} %% of travel away from them
+        """,
+        **{"from": lowest},
+        to={"dest": "highest", "type": _percent, "default": default.highest},
     )
     for name, unit, text in (
         ("speed", "M/S", "largest speed of the sliding stem, m/s"),
@@ -145,19 +127,15 @@ def _add_sensors(parser: argparse.ArgumentParser) -> None:
         sensors.add_argument(
             f"--{name}", type=float, default=value, metavar=unit, help=f"{text} (%(default)g)"
         )
-    sensors.add_argument(
-        "--timing-uncertainty",
-        type=float,
-        metavar="S",
-        help="standard deviation of the total lag between the signals, as in `identify` (valve "
-        f"file, or {TIMING_UNCERTAINTY:g})",
+    add_options(
+        sensors,
+        "--timing-uncertainty S: standard deviation of the total lag between the signals, as in "
+        f"`identify` (valve file, or {TIMING_UNCERTAINTY:g})",
+        timing_uncertainty={"type": float},
     )
 
 
 def _earlier(options: argparse.Namespace) -> Mapping[str, float]:
-    """Return the values of the earlier result, if one is named."""
-    from valve_friction_ros.commands.arguments.estimate_file import read_estimate  # noqa: PLC0415
-    from valve_friction_ros.commands.arguments.kept_valves import chosen_valves  # noqa: PLC0415
     from valve_friction_ros.history import History  # noqa: PLC0415 - slow to import
 
     if options.estimate is not None:
@@ -217,22 +195,6 @@ def frictions_from(options: argparse.Namespace, described: "ValveFile") -> "Fric
         static_friction=static,
         viscous_friction=viscous,
         factor=options.friction_factor,
-    )
-
-
-def planned_limits(options: argparse.Namespace) -> Limits:
-    """Return the limits that the options state."""
-    given = {one.name: vars(options).get(one.name, one.default) for one in fields(Limits)}
-    return Limits(**given)
-
-
-def planned_conditions(options: argparse.Namespace) -> Conditions:
-    """Return the sensors that the options state."""
-    return Conditions(
-        options.sample_rate,
-        1e-6 * options.position_noise_um,
-        options.pressure_noise_pa,
-        options.converter_lag,
     )
 
 

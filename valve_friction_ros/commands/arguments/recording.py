@@ -19,6 +19,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+from valve_friction_ros.commands.arguments import add_options
 from valve_friction_ros.records.bags.topics import TopicChoice
 from valve_friction_ros.records.columns import Columns
 
@@ -41,19 +42,14 @@ def add_recording_arguments(parser: argparse.ArgumentParser) -> None:
         help="recording: CSV (gzipped or not, - for standard input), Excel or Parquet; or a ROS 2 "
         "bag, MCAP or SQLite3: its folder or one of its files, compressed or not",
     )
-    parser.add_argument(
-        "--valve",
-        type=Path,
-        metavar="FILE.yaml",
-        help="diaphragm_area, pressure_reference, travel, columns …, or parameters of an "
-        "identifier; needed unless the file holds force_n, or a bag its own valve.yaml",
-    )
-    parser.add_argument(
-        "--save-columns",
-        type=Path,
-        metavar="FILE.yaml",
-        help="write a valve file with the recognized table format, so that the next export needs "
-        "no option",
+    add_options(
+        parser,
+        """
+        --valve FILE.yaml: diaphragm_area, pressure_reference, travel, columns …, or parameters of
+            an identifier; needed unless the file holds force_n, or a bag its own valve.yaml
+        --save-columns FILE.yaml: write a valve file with the recognized table format, so that the
+            next export needs no option
+        """,
     )
     add_reading_arguments(parser)
 
@@ -70,16 +66,16 @@ def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
     bag = parser.add_argument_group(
         "bags", "topics are found by type unless these options name them"
     )
-    bag.add_argument(
-        "--pressure-topic",
-        metavar="TOPIC",
-        help="pressure topic; without a leading slash: in the namespace of each valve",
+    add_options(
+        bag,
+        """
+        --pressure-topic TOPIC: pressure topic; without a leading slash: in the namespace of each
+            valve
+        --stem-topic TOPIC: stem topic, likewise
+        --joint NAME: joint that is the stem (the only one, or 'stem')
+        --valve-name NAMESPACE: which of several valves
+        """,
     )
-    bag.add_argument("--stem-topic", metavar="TOPIC", help="stem topic, likewise")
-    bag.add_argument(
-        "--joint", metavar="NAME", help="joint that is the stem (the only one, or 'stem')"
-    )
-    bag.add_argument("--valve-name", metavar="NAMESPACE", help="which of several valves")
     add_table_arguments(
         parser,
         "each may be set in the section `columns:` of the valve file instead, as time_column: Time",
@@ -117,8 +113,8 @@ def reading_options(
 
     Raises ValueError if they do not go together.
     """
+    from valve_friction_ros.records.recorded_valve import Stretch  # noqa: PLC0415
     from valve_friction_ros.records.recordings import ReadingOptions  # noqa: PLC0415 - slow
-    from valve_friction_ros.records.stretch import Stretch  # noqa: PLC0415
 
     return ReadingOptions(
         replace(columns or Columns(), **given_columns(arguments)),
@@ -144,9 +140,9 @@ def save_columns(arguments: argparse.Namespace, reading: "ReadingOptions") -> No
     """
     if arguments.save_columns is None:
         return
+    from valve_friction_ros.records.files import write_whole  # noqa: PLC0415
     from valve_friction_ros.records.table import OpenTable  # noqa: PLC0415 - slow to import
     from valve_friction_ros.records.valve_file import with_columns  # noqa: PLC0415
-    from valve_friction_ros.records.whole_file import write_whole  # noqa: PLC0415
 
     table = OpenTable(arguments.file, reading.columns)
     table.require_settled()
@@ -197,8 +193,8 @@ def described(
     Raises ValueError if the valve file cannot be read, or is needed and not given.
     """
     from valve_friction_ros.model import Valve  # noqa: PLC0415 - slow to import
+    from valve_friction_ros.records.files import on_disk  # noqa: PLC0415
     from valve_friction_ros.records.recordings import holds_force  # noqa: PLC0415
-    from valve_friction_ros.records.stores import on_disk  # noqa: PLC0415
     from valve_friction_ros.records.valve_file import ValveFile, read_valve_file  # noqa: PLC0415
 
     valve_file = valve_file or _own_description(recording)

@@ -35,7 +35,6 @@ from valve_friction_ros.nodes.service_call import (
     set_parameters_request,
 )
 from valve_friction_ros.streams import RecordBuffer
-from valve_friction_ros.streams.record_buffer import Snapshot
 from valve_friction_ros.wording import Code, said
 
 _POLL = 0.05
@@ -115,13 +114,9 @@ class BenchClient(Node):
         self._buffer.clear(said(Code.CLEARED_AS_RECORD_BEGINS))
         self._first_stamp = None
 
-    def snapshot(self) -> Snapshot:
-        """Copy what was gathered."""
-        return self._buffer.snapshot()
-
     def recording(self) -> Recording:
         """Return what was gathered, on a uniform grid."""
-        return self.snapshot().recording()
+        return self._buffer.snapshot().recording()
 
     def wait(self, done: Callable[[], bool], timeout: float, what: str) -> None:
         """Spin until `done` is true; raises BenchError naming `what` after `timeout` seconds."""

@@ -132,7 +132,6 @@ def identified(client: BenchClient, label: str, truth: KarnoppParameters) -> Out
 
 
 def _found(name: str, values: Mapping[str, str]) -> Parameter:
-    """Read a parameter with its verdict from a diagnostic."""
     half_width = float(values[f"{name} half width [{UNITS[name]}]"])
     return Parameter(
         name,
@@ -229,7 +228,6 @@ class _Story(NamedTuple):
 
 
 def _run(client: BenchClient, console: Console) -> _Story:
-    """Run the story; return what was seen."""
     with console.status("waiting for the nodes"):
         client.wait(lambda: client.recorded > 0, _START_TIMEOUT, "stem position")
         client.wait(lambda: client.identifier_hears, _START_TIMEOUT, "samples in the identifier")

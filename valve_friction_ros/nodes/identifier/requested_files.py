@@ -24,8 +24,7 @@ from valve_friction_ros.nodes.identifier.response_watch import ResponseWatch
 from valve_friction_ros.nodes.identifier.usage_watch import UsageWatch
 from valve_friction_ros.nodes.plumbing.output_folder import OutputFolder, free_path
 from valve_friction_ros.nodes.plumbing.processes import ThisProcess, give_back_memory, imported
-from valve_friction_ros.records.bags.storage import bag_libraries
-from valve_friction_ros.records.bags.topics import StreamNames
+from valve_friction_ros.records.bags.topics import StreamNames, bag_libraries
 from valve_friction_ros.settings import IDENTIFICATION
 from valve_friction_ros.streams import Snapshot, utc
 

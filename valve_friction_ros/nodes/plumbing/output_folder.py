@@ -22,7 +22,7 @@ from rclpy.node import Node
 
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.nodes.plumbing.worker import done_in
-from valve_friction_ros.records.data_folder import data_folder
+from valve_friction_ros.records.files import data_folder
 from valve_friction_ros.streams import utc
 
 _BLOCK = 4096

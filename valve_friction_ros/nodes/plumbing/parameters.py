@@ -27,7 +27,7 @@ from rclpy.parameter import Parameter
 
 from valve_friction_ros.model import KarnoppParameters, Valve
 from valve_friction_ros.nodes.plumbing.rclpy_private import parameter_overrides
-from valve_friction_ros.records.spelling import nearest, resembling
+from valve_friction_ros.outside_text import nearest, resembling
 from valve_friction_ros.settings import KARNOPP, NODE_NAMES, VALVE, Setting, is_known
 
 _TURNS_SIGNALS = ("columns.inverted_position", "columns.opposing_pressure_column")

@@ -35,25 +35,22 @@ from valve_friction_ros.records.bags.rosbags_internals import (
     decode,
     stamp_of,
 )
-from valve_friction_ros.records.bags.storage import (
+from valve_friction_ros.records.bags.topics import (
     MCAP,
+    PRESSURE_TYPE,
     ROS_1,
     SQLITE,
+    STEM_TYPE,
     ZSTD,
     DamagedFileError,
     Storage,
-    first_bytes,
-)
-from valve_friction_ros.records.bags.topics import (
-    PRESSURE_TYPE,
-    STEM_TYPE,
     Topic,
     TopicChoice,
     ValveTopics,
+    first_bytes,
     valves_in,
 )
-from valve_friction_ros.records.recorded_valve import RecordedValve
-from valve_friction_ros.records.stretch import Stretch
+from valve_friction_ros.records.recorded_valve import RecordedValve, Stretch
 from valve_friction_ros.streams.record_buffer import RecordBuffer
 from valve_friction_ros.streams.samples import joint_position, only_joint, uniform_recording
 
@@ -341,30 +338,27 @@ class ValveFeed:
             if name is not None
         }
 
-    def _wants(self, stamp: int) -> bool:
+    def _read(self, data: bytes, topic: str | None, kind: str) -> tuple[int, Any] | None:
+        """Decode a message; None if it cannot be, or its stamp is outside the stretch."""
+        try:
+            message = decode(data, kind)
+        except UndecodableError:
+            self._undecodable[str(topic)] = self._undecodable.get(str(topic), 0) + 1
+            return None
+        stamp = stamp_of(message)
         if self._first_stamp is None:
             self._first_stamp = stamp
-        return self._stretch.contains(stamp - self._first_stamp)
+        return (stamp, message) if self._stretch.contains(stamp - self._first_stamp) else None
 
     def _take_pressure(self, data: bytes) -> None:
-        try:
-            message = decode(data, PRESSURE_TYPE)
-        except UndecodableError:
-            self._count_undecodable(self._topics.pressure)
-            return
-        stamp = stamp_of(message)
-        if self._wants(stamp):
+        if read := self._read(data, self._topics.pressure, PRESSURE_TYPE):
+            stamp, message = read
             self._buffer.add_pressure(stamp, float(message.fluid_pressure))
 
     def _take_stem(self, data: bytes) -> None:
-        try:
-            message = decode(data, STEM_TYPE)
-        except UndecodableError:
-            self._count_undecodable(self._topics.stem)
+        if not (read := self._read(data, self._topics.stem, STEM_TYPE)):
             return
-        stamp = stamp_of(message)
-        if not self._wants(stamp):
-            return
+        stamp, message = read
         self._joints_seen.update(message.name)
         if self._joint is None:
             try:
@@ -374,9 +368,6 @@ class ValveFeed:
                 return
         position = joint_position(message.name, message.position.tolist(), self._joint)
         self._buffer.add_position(stamp, position)
-
-    def _count_undecodable(self, topic: str | None) -> None:
-        self._undecodable[str(topic)] = self._undecodable.get(str(topic), 0) + 1
 
     def notes(self) -> list[str]:
         """Return which messages were left out, and why."""
@@ -429,14 +420,6 @@ def _valves(
         raise ValueError(f"{path}: {error}") from None
 
 
-def _pass_on(storages: Sequence[Storage], feeds: Sequence[ValveFeed]) -> None:
-    """Hand each message to its valve, in one pass."""
-    takers = {topic: take for feed in feeds for topic, take in feed.inputs.items()}
-    for storage in storages:
-        for topic, data in storage.messages(takers.keys() & set(storage.topics)):
-            takers[topic](data)
-
-
 def _outcome(feed: ValveFeed, topics: ValveTopics) -> Recording | RefusalError:
     if topics.missing is not None:
         return RefusalError(topics.missing)
@@ -462,7 +445,10 @@ def _read(
             (each, ValveFeed(each, valve, choice.joint, stretch))
             for each in _valves(path, topics, choice, damaged)
         ]
-        _pass_on(storages, [feed for _, feed in found])
+        takers = {topic: take for _, feed in found for topic, take in feed.inputs.items()}
+        for storage in storages:
+            for topic, data in storage.messages(takers.keys() & set(storage.topics)):
+                takers[topic](data)
     return found
 
 

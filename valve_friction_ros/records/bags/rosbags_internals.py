@@ -28,8 +28,7 @@ from rosbags.rosbag2.storage_mcap import McapReader
 from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_typestore
 
-from valve_friction_ros.records.bags.storage import DamagedFileError
-from valve_friction_ros.records.bags.topics import Topic
+from valve_friction_ros.records.bags.topics import ZSTD, DamagedFileError, Topic
 
 TYPES = get_typestore(Stores.ROS2_JAZZY)
 """Message types; those of pressure and stem have not changed since ROS 2 began."""
@@ -99,7 +98,6 @@ class McapFile:
         self._reader.close()
 
 
-_ZSTD = b"\x28\xb5\x2f\xfd"
 _NANOSECONDS = 1_000_000_000
 
 
@@ -112,7 +110,7 @@ def decode(data: bytes, kind: str) -> Any:
 
     Raises UndecodableError if the bytes are no such message.
     """
-    if data.startswith(_ZSTD):
+    if data.startswith(ZSTD):
         try:
             data = zstd.decompress(data)
         except zstd.ZstdError as error:

@@ -7,11 +7,14 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Which topics of a bag belong to which valve."""
+"""What tells a bag, what its files offer, and which of its topics belong to which valve."""
 
-from collections.abc import Collection, Iterable
+import contextlib
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
-from typing import NamedTuple
+from itertools import takewhile
+from pathlib import Path
+from typing import NamedTuple, Protocol
 
 PRESSURE_TYPE = "sensor_msgs/msg/FluidPressure"
 STEM_TYPE = "sensor_msgs/msg/JointState"
@@ -114,12 +117,8 @@ def _one(names: list[str], kind: str, option: str) -> str | None:
 
 
 def _common_namespace(*namespaces: str) -> str:
-    common = []
-    for parts in zip(*(namespace.split("/") for namespace in namespaces), strict=False):
-        if len(set(parts)) > 1:
-            break
-        common.append(parts[0])
-    return "/".join(common) or "/"
+    levels = zip(*(namespace.split("/") for namespace in namespaces), strict=False)
+    return "/".join(parts[0] for parts in takewhile(lambda one: len({*one}) == 1, levels)) or "/"
 
 
 def _paired(pressures: dict[str, list[str]], stems: dict[str, list[str]]) -> list[ValveTopics]:
@@ -173,3 +172,69 @@ def valves_in(topics: Collection[Topic], choice: TopicChoice) -> list[ValveTopic
         names = ", ".join(valve.name for valve in valves)
         raise ValueError(f"no valve {wanted} in it; it holds {names}")
     return chosen
+
+
+_LIBRARIES = ("rosbags", "lz4", "backports")
+"""Top-level modules. rosbags itself asks for the others."""
+
+_REMEDY = "run `pip install 'rosbags>=0.11.9,<0.12' lz4 backports.zstd`"
+
+
+@contextlib.contextmanager
+def bag_libraries() -> Iterator[None]:
+    """Import modules of this room that need rosbags, lz4 and backports.zstd within this block.
+
+    Raises ValueError, which says what to install, if one of these is not there, or is another
+    version.
+    """
+    try:
+        yield
+    except ImportError as error:
+        library = (error.name or "").partition(".")[0]
+        if library not in _LIBRARIES:
+            raise
+        raise ValueError(
+            f"bags need rosbags, lz4 and backports.zstd ({error}): {_REMEDY}"
+        ) from None
+
+
+MCAP = b"\x89MCAP0\r\n"
+SQLITE = b"SQLite format 3\0"
+ZSTD = b"\x28\xb5\x2f\xfd"
+ROS_1 = b"#ROSBAG V"
+
+_SUFFIXES = (".mcap", ".db3", ".zstd", ".bag")
+
+
+def first_bytes(path: Path) -> bytes:
+    """Return the bytes of a file that tell its format."""
+    with path.open("rb") as stream:
+        return stream.read(16)
+
+
+def is_bag(path: Path) -> bool:
+    """Return whether a file or folder is a bag, by its content or its ending, and no CSV file."""
+    if path.is_dir() or path.suffix in _SUFFIXES:
+        return True
+    try:
+        return first_bytes(path).startswith((MCAP, SQLITE, ZSTD, ROS_1))
+    except OSError:
+        return False
+
+
+class DamagedFileError(Exception):
+    """A storage file that cannot be read as it should be; the file is its first argument."""
+
+    def __init__(self, path: Path, cause: str) -> None:
+        super().__init__(path, cause)
+        self.path = path
+        self.cause = cause.rstrip(".")
+
+
+class Storage(Protocol):
+    """One storage file of a bag, open for reading."""
+
+    topics: Collection[Topic]
+
+    def messages(self, topics: Collection[Topic]) -> Iterator[tuple[Topic, bytes]]:
+        """Go through the messages of some topics in the order of their recording."""

@@ -7,10 +7,10 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Folders and files in object stores, named as fsspec names them: ``s3://bucket/folder``.
+"""Files and folders: those of nodes, one that is written whole, and those in object stores.
 
-Keys and addresses of the stores are fsspec's own business: its variables of the environment, and
-its files of configuration.
+A file in a store is named as fsspec names it: ``s3://bucket/folder``. Keys and addresses of the
+stores are fsspec's own business: its variables of the environment, and its files of configuration.
 """
 
 import contextlib
@@ -21,7 +21,50 @@ from tempfile import TemporaryDirectory
 from typing import Any, cast
 
 from valve_friction_ros.identification.refusal import RefusalError
-from valve_friction_ros.records.whole_file import cause_of
+
+
+def data_folder() -> Path:
+    """Return the package's folder under ROS_HOME, or under ~/.ros without it.
+
+    Where the home directory is not known, the path begins with ``~``.
+    """
+    home = os.environ.get("ROS_HOME") or Path("~/.ros")
+    folder = Path(home) / "valve_friction_ros"
+    with contextlib.suppress(RuntimeError):
+        return folder.expanduser()
+    return folder
+
+
+def history_file() -> Path:
+    """Return the default file of the history."""
+    return data_folder() / "history.sqlite"
+
+
+def write_whole(path: Path, content: bytes) -> None:
+    """Write a file; a failure leaves no part of it, and keeps what was there before.
+
+    A link stays a link, a device or a pipe is written to as it is. Raises OSError, which names
+    `path`.
+    """
+    place = path.resolve()
+    is_special = place.exists() and not place.is_file()
+    draft = place if is_special else place.with_name(f".{os.getpid()}_{place.name}")
+    try:
+        draft.write_bytes(content)
+        if not is_special:
+            draft.replace(place)
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(path)) from None
+    finally:
+        if not is_special:
+            with contextlib.suppress(OSError):  # a read-only folder holds no draft
+                draft.unlink(missing_ok=True)
+
+
+def cause_of(error: Exception) -> str:
+    """Return the system's words for an error of its own; else the error's."""
+    return str((isinstance(error, OSError) and error.strerror) or error)
+
 
 _REMEDY = "S3 needs `pip install s3fs 'universal_pathlib>=0.3.10,<0.4'` (the extra `stores`)"
 _LONGEST_CAUSE = 200

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import pytest
 
-from valve_friction_ros.records.whole_file import write_whole
+from valve_friction_ros.records.files import write_whole
 
 
 @pytest.fixture
