@@ -399,12 +399,14 @@ def test_refusals_name_what_to_relax():
     [(HIGH_FRICTION, ("coulomb_friction", "viscous_friction")), (LOW_FRICTION, ())],
 )
 def test_forecasts_are_what_the_method_reports(true, names):
-    """At the valve itself; noise of another seed."""
+    """At the valve itself; the median of three seeds of the noise, each another one."""
     wave = SquareWave(8e4, 1.5e5, 9.0)
     motion = moved(wave, 40.0, BENCH_VALVE, true, CONDITIONS)
     record = Recording(motion.sample_period, motion.pressure, motion.stem.position)
-    noisy = SensorNoise(10e-6, 100.0, 77).applied_to(record)
-    result = identify(noisy, BENCH_VALVE, SETTINGS)
+    results = [
+        identify(SensorNoise(10e-6, 100.0, seed).applied_to(record), BENCH_VALVE, SETTINGS)
+        for seed in (77, 78, 79)
+    ]
     told = expected_half_widths(
         SensorNoise(10e-6, 100.0, 0).applied_to(record),
         BENCH_VALVE,
@@ -413,7 +415,8 @@ def test_forecasts_are_what_the_method_reports(true, names):
         start=float(motion.stem.position[0]),
     )
     for name in (*names, "sliding_friction", "spring_constant"):
-        assert 0.5 < result.parameters[name].half_width / told[name] < 2.0, name
+        reported = np.median([one.parameters[name].half_width for one in results])
+        assert 0.5 < reported / told[name] < 2.0, name
 
 
 def test_calibration_and_timing_widen_a_forecast():
@@ -439,7 +442,7 @@ def test_valves_that_the_planner_does_not_know(seed):
     name = "coulomb_friction"
     assert trial.errors[name] <= trial.reported[name] < 0.2
     assert 0.3 < trial.reported[name] / trial.predicted[name] < 6.0
-    assert trial.square[name] > 2.0 * trial.reported[name]
+    assert trial.square[name] > trial.reported[name]
 
 
 def test_friction_that_may_fall_with_speed_is_remarked_on():

@@ -212,11 +212,11 @@ class TestTimingUncertainty:
         assert abs(lag["value"] - late * PERIOD) <= lag["half_width"] < 2e-3
 
     def test_without_one_no_motion_that_hides_a_lag_is_trusted(self, square):
-        """A square wave hides it in F_c and F_v: neither is narrower than by 20 ms stated.
+        """A square wave hides it in F_c and F_v: neither is narrower than by 5.9 ms stated.
 
-        That is the normal prior with the 95 % of the heavy-tailed one.
+        That is the normal prior which holds half of all lags within 4 ms too, without long tails.
         """
-        settings = IdentificationSettings(timing_uncertainty=0.02)
+        settings = IdentificationSettings(timing_uncertainty=5.9e-3)
         stated = identify(square, BENCH_VALVE, settings).parameters
         for name, one in identify(square, BENCH_VALVE).parameters.items():
             if name in ("coulomb_friction", "viscous_friction"):

@@ -20,7 +20,7 @@ from hypothesis import strategies as st
 from scipy.signal import lfilter
 
 from valve_friction_ros.identification.engine import balance_regression, friction_curve
-from valve_friction_ros.identification.engine.balance_regression import LagPrior, Regression
+from valve_friction_ros.identification.engine.balance_regression import Regression
 from valve_friction_ros.identification.engine.friction_curve import (
     FrictionCurve,
     checked_by_curve,
@@ -30,6 +30,7 @@ from valve_friction_ros.identification.engine.friction_curve import (
 )
 from valve_friction_ros.identification.engine.imperfections import sensor_span, zero_drift
 from valve_friction_ros.identification.engine.intervals import Budget, Estimated
+from valve_friction_ros.identification.engine.lags import LagPrior
 from valve_friction_ros.identification.engine.sliding_averages import (
     _lengths,
     _Path,
@@ -235,21 +236,10 @@ class TestDistance:
 class TestRival:
     ONE = Estimated(100.0, 20.0, Budget(10.0, 0.0, {}))
 
-    def test_a_near_one_is_in_the_interval(self):
-        wide = replace(self.ONE, rival=70.0).with_rival
-        assert wide.half_width == pytest.approx(33.0)
-        assert wide.own_half_width == pytest.approx(self.ONE.own_half_width, rel=0.03)
-        assert replace(self.ONE, rival=90.0).with_rival.half_width == 20.0
-        assert self.ONE.with_rival == self.ONE
-
-    def test_a_far_one_is_named_instead(self):
-        far = replace(self.ONE, rival=55.0)
-        assert far.has_rival
-        assert far.with_rival == far
-
-    def test_what_is_sharp_stays_sharp(self):
-        sharp = replace(self.ONE, half_width=4.0, rival=93.0)
-        assert sharp.with_rival == sharp
+    def test_only_one_far_beyond_the_interval_is_named(self):
+        assert replace(self.ONE, rival=55.0).has_rival
+        assert not replace(self.ONE, rival=70.0).has_rival
+        assert not self.ONE.has_rival
 
 
 class TestRareImperfections:
@@ -377,10 +367,12 @@ class TestLagPrior:
     LAGS = np.linspace(-2.0, 2.0, 400_001)
 
     def test_unstated(self):
-        """Student's t: half within 0.8 of 10 ms, 95 % within 43 ms; never impossible."""
+        """Cauchy's: half within 4 ms, 95 % within 51 ms, 2·arctan(x/4 ms)/π; never impossible."""
         density = np.exp(LagPrior().log_density(self.LAGS))
-        share = [np.sum(density[np.abs(self.LAGS) < reach]) for reach in (8.165e-3, 43.03e-3)]
-        assert np.array(share) / np.sum(density) == pytest.approx([0.5, 0.95], abs=1e-3)
+        share = [np.sum(density[np.abs(self.LAGS) < reach]) for reach in (4e-3, 50.82e-3)]
+        inside = 2.0 / math.pi * math.atan(self.LAGS[-1] / 4e-3)
+        expected = np.array([0.5, 0.95]) / inside
+        assert np.array(share) / np.sum(density) == pytest.approx(expected, abs=1e-3)
         assert not LagPrior().is_known
 
     def test_stated(self):

@@ -20,6 +20,7 @@ from valve_friction_ros.identification.engine.broad_model import ABSENT, BroadMo
 from valve_friction_ros.identification.engine.fitted_record import fitted_record
 from valve_friction_ros.identification.engine.imperfections import TIMING, Profile
 from valve_friction_ros.identification.engine.intervals import Budget
+from valve_friction_ros.identification.engine.lags import LagPrior
 from valve_friction_ros.identification.engine.posterior_fit import bounded_minimum, fit
 from valve_friction_ros.identification.engine.remarks import sampling_remarks
 from valve_friction_ros.identification.engine.search import Prior, _likeliest, _Search, lagging
@@ -171,7 +172,7 @@ def test_what_the_record_does_not_see_is_unknown(model):
 def test_a_friction_that_falls_with_speed_leaves_that_speed_free(model):
     """Also where only a dead zone was to be added: a speed that is held would look certain."""
     falling = {**TRUE, "slip_force": 50.0, "stribeck_velocity": 1e-3}
-    search = _Search(model.record, Prior(0.01, TRUE["mass"], {}))
+    search = _Search(model.record, Prior(LagPrior(0.01), TRUE["mass"], {}))
     assert "stribeck_velocity" in search.full({**search.base, **falling}).names
     assert "stribeck_velocity" not in search.full({**search.base, **TRUE}).names
 

@@ -9,10 +9,10 @@
 
 """The force balance of the sliding stem: regressed, with all that the lag leaves open."""
 
+import copy
 import itertools
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -25,10 +25,17 @@ from valve_friction_ros.identification.engine.imperfections import (
     zero_drift,
 )
 from valve_friction_ros.identification.engine.intervals import ROUNDING, Budget, Estimated
-from valve_friction_ros.identification.engine.numbers import RECTANGLE
-from valve_friction_ros.identification.engine.sliding_averages import (
+from valve_friction_ros.identification.engine.lags import (
     LAGS,
     LARGEST_LAG,
+    USUAL_LAG,
+    LagPrior,
+    mixture_half_width,
+    normal,
+    spread_of,
+)
+from valve_friction_ros.identification.engine.numbers import RECTANGLE
+from valve_friction_ros.identification.engine.sliding_averages import (
     WORK_LAGS,
     Averages,
     Work,
@@ -37,7 +44,6 @@ from valve_friction_ros.identification.engine.sliding_averages import (
 from valve_friction_ros.identification.engine.weights import inflation
 from valve_friction_ros.identification.trust.sliding import SPEED_EXPONENT
 from valve_friction_ros.identification.trust.uncertainty import (
-    CONFIDENCE,
     MEDIAN_MAGNITUDE,
     NORMAL_QUANTILE,
 )
@@ -45,12 +51,6 @@ from valve_friction_ros.identification.units import SLIDING
 from valve_friction_ros.model.valve import Valve
 
 _Array = NDArray[np.float64]
-
-_USUAL_LAG = 10e-3
-"""Scale, s, of the lag's prior, Student's t of two degrees of freedom, without a stated one.
-
-Stamps of one controller agree to some milliseconds; transmitters with damping, tubing and clocks of
-their own add up to tens. Half of the plants lie within 0.8 of it, 95 % within 43 ms."""
 
 _USUAL_VISCOUS = 1.0
 """Scale of the prior of viscous over dry friction at the sliding speed, Student's t of two degrees
@@ -93,64 +93,15 @@ common; averages that tell as much as one that does not overlap with others; a s
 _BINS = 12
 """Bins of the friction curve in each direction."""
 
-_NEGLIGIBLE, _HALVINGS = 1e-6, 24
-"""Probability of a lag that no interval notices; halvings by which an interval is found."""
-
 _BLOCKS = (6, 60)
 _LARGEST_SCATTER = 25.0
 """Least and largest number of strokes whose scatter widens the covariance, and the factor by which
 it does so at most."""
 
 
-@dataclass(frozen=True)
-class LagPrior:
-    """What is known of the time by which the stem is seen late, before the record is.
-
-    Attributes
-    ----------
-    deviation : float or None
-        Standard deviation of a Gaussian, s; None for the heavy-tailed prior of a plant whose timing
-        nobody has stated.
-    """
-
-    deviation: float | None = None
-
-    @property
-    def is_known(self) -> bool:
-        """Whether there certainly is no lag."""
-        return self.deviation == 0.0
-
-    def precision(self, lag: float) -> float:
-        """Return the precision, 1/s², of a Gaussian that stands for the prior at `lag`."""
-        if self.deviation is not None:
-            return 1.0 / max(self.deviation, 1e-9) ** 2
-        return 1.0 / (4.0 * _USUAL_LAG**2 + lag**2)
-
-    def log_density(self, lags: _Array) -> _Array:
-        """Return the logarithm of the density at each lag, s, but for a constant."""
-        if self.deviation is not None:
-            return np.asarray(-0.5 * (lags / max(self.deviation, 1e-9)) ** 2)
-        return _heavy_tailed(lags / _USUAL_LAG)
-
-    def probability(self, log_likelihood: _Array) -> _Array:
-        """Return the probability of each of `LAGS`, by this prior and a likelihood."""
-        log = self.log_density(LAGS) + log_likelihood
-        probability = np.exp(log - log.max())
-        return np.asarray(probability / np.sum(probability))
-
-
 def _heavy_tailed(deviations: _Array) -> _Array:
     """Return the logarithm of Student's t density of two degrees of freedom, but for a constant."""
     return np.asarray(-1.5 * np.log1p(deviations**2 / 2.0))
-
-
-_DEVIATIONS: _Array = np.linspace(-9.0, 9.0, 3601, dtype=np.float64)
-_PROBABILITIES: _Array = np.array([0.5 * math.erfc(-one / math.sqrt(2.0)) for one in _DEVIATIONS])
-
-
-def _normal(deviations: _Array) -> _Array:
-    """Return the normal distribution function, to 1e-6."""
-    return np.interp(deviations, _DEVIATIONS, _PROBABILITIES)
 
 
 class _Solved(NamedTuple):
@@ -399,7 +350,7 @@ class Regression:
             }
             for speed, one in falling.items()
             if misfits[speed] < _STRIBECK_OPEN * misfits[stribeck]
-            and abs(one.lag - solved.lag) < _USUAL_LAG
+            and abs(one.lag - solved.lag) < USUAL_LAG
         ]
         inflated = 3.0
         for _ in range(3):
@@ -649,10 +600,19 @@ class Posterior:
                 gradient = np.eye(solved.scale.size)[self.regression.names.index(name)]
                 centre, slope, width = self._given_lag(gradient, self.all[0])
                 value = centre + slope * (self.changes - solved.estimate[index])
-                log = log + np.log(np.maximum(_normal(value / width), 1e-10))
+                log = log + np.log(np.maximum(normal(value / width), 1e-10))
                 if name == "viscous_friction":
                     log = log + self._of_viscous(value)
         return np.asarray(log - log.max())
+
+    def timed(self, log_likelihood: _Array) -> "Posterior":
+        """Return the same under another likelihood of `LAGS`, which tells a lag from F_v/k."""
+        other = copy.copy(self)
+        other.log_likelihood = log_likelihood
+        other.probability = other.of_record = self.regression.lag.probability(log_likelihood)
+        other.information = spread_of(np.exp(log_likelihood)) ** -2.0
+        other.exchanged = 0.0
+        return other
 
     def _of_viscous(self, viscous: _Array) -> _Array:
         """Return the logarithm of the prior density of each viscous friction, N·s/m."""
@@ -729,13 +689,7 @@ class Posterior:
         if self.lags.size > 1:
             timing = math.sqrt(float(np.sum(weights * (values - means[:, None]) ** 2)))
         open_ = float(np.sum(weights * record**2) + shares @ (means - mean) ** 2)
-        low, high = 0.0, 20.0 * math.sqrt(open_ + timing**2)
-        some = weights > _NEGLIGIBLE
-        weight, away, deviation = weights[some], mean - values[some], record[some]
-        for _ in range(_HALVINGS):
-            middle = 0.5 * (low + high)
-            inside = _normal((away + middle) / deviation) - _normal((away - middle) / deviation)
-            low, high = (middle, high) if weight @ inside < CONFIDENCE else (low, middle)
+        high = mixture_half_width(np.asarray(weights), values, record)
         # The tails of the lag are heavier than normal ones: its share is that of the interval.
         whole = high / NORMAL_QUANTILE
         timing = min(timing, math.sqrt(max(whole**2 - open_, 0.0)))

@@ -25,13 +25,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from valve_friction_ros.identification.engine.balance_regression import LagPrior
 from valve_friction_ros.identification.engine.imperfections import (
     IMPERFECTIONS,
     sensor_span,
     zero_drift,
 )
 from valve_friction_ros.identification.engine.intervals import Budget, Estimated
+from valve_friction_ros.identification.engine.lags import LagPrior
 from valve_friction_ros.identification.engine.numbers import RECTANGLE
 from valve_friction_ros.identification.engine.sliding_averages import (
     MeasuredSignal,

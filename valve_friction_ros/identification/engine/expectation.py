@@ -15,10 +15,11 @@ from collections.abc import Mapping
 from valve_friction_ros.identification.engine.fitted_record import fitted_record
 from valve_friction_ros.identification.engine.friction_curve import (
     checked_by_curve,
-    curve_numbers,
     friction_curves,
+    timed_numbers,
 )
 from valve_friction_ros.identification.engine.intervals import Estimated, estimated
+from valve_friction_ros.identification.engine.lags import LagProfile
 from valve_friction_ros.identification.engine.method import (
     known_of,
     lag_prior_of,
@@ -86,11 +87,14 @@ def expected_half_widths(
     fits = posteriors_at(
         fitted_record(stamped, valve), prior_of(settings, valve=valve), truth, with_competitors
     )
-    numbers: Mapping[str, Estimated] = estimated(fits)
+    numbers: Mapping[str, Estimated] = estimated(fits, lag=lag_prior_of(settings))
     if with_competitors:
         curves = friction_curves(stamped, valve, lag_prior_of(settings), known_of(settings))
         numbers = checked_by_curve(
-            numbers, curve_numbers(curves), follows=True, slip_force=truth["slip_force"]
+            numbers,
+            timed_numbers(curves, LagProfile.of(fits)),
+            follows=True,
+            slip_force=truth["slip_force"],
         )
     return {
         name: math.hypot(

@@ -30,18 +30,13 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from valve_friction_ros.identification.engine.balance_regression import (
-    LagPrior,
-    Posterior,
-    Regression,
-)
+from valve_friction_ros.identification.engine.balance_regression import Posterior, Regression
 from valve_friction_ros.identification.engine.imperfections import sensor_span, zero_drift
 from valve_friction_ros.identification.engine.intervals import ROUNDING, Budget, Estimated
+from valve_friction_ros.identification.engine.lags import LAGS, LARGEST_LAG, LagPrior, LagProfile
 from valve_friction_ros.identification.engine.numbers import RECTANGLE
 from valve_friction_ros.identification.engine.sliding_averages import (
     FINEST_STEP,
-    LAGS,
-    LARGEST_LAG,
     WORK_LAGS,
     MeasuredSignal,
     Work,
@@ -155,6 +150,8 @@ class FrictionCurve:
         Share of the force that the balance reproduces, and deviation of what it leaves, N.
     correlation : Correlation or None
         How the errors of the numbers go together.
+    posterior : Posterior or None
+        What the regression leaves open; None of whole strokes.
     """
 
     averaging_time: float
@@ -169,6 +166,13 @@ class FrictionCurve:
     fit: float
     misfit: float
     correlation: Correlation | None = field(default=None, repr=False)
+    posterior: Posterior | None = field(default=None, repr=False)
+
+    def timed(self, log_likelihood: _Array) -> "FrictionCurve":
+        """Return the same under another likelihood of `LAGS`, as simulated stems tell it."""
+        if self.posterior is None or self.posterior.regression.lag.is_known:
+            return self
+        return _curve_of(self.posterior.timed(log_likelihood))
 
 
 def friction_curves(
@@ -254,6 +258,7 @@ def _curve_of(posterior: Posterior) -> FrictionCurve:
         1.0 - solved.misfit / max(float(np.std(averages.force[0][averages.taken])), _TINY),
         solved.misfit,
         correlation_of(gradients, solved.covariance),
+        posterior,
     )
 
 
@@ -423,6 +428,13 @@ def curve_numbers(curves: Sequence[FrictionCurve]) -> dict[str, Estimated]:
         )
         result[name] = replace(best, half_width=half_width)
     return result
+
+
+def timed_numbers(curves: Sequence[FrictionCurve], lags: LagProfile | None) -> dict[str, Estimated]:
+    """Return the same numbers with the lag as likely as simulated stems tell it, where they do."""
+    if lags is not None and len(lags.fits) > 1:
+        curves = [one.timed(lags.log_likelihood) for one in curves]
+    return curve_numbers(curves)
 
 
 def _agree(one: Estimated, other: Estimated) -> bool:

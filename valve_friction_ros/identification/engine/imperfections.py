@@ -42,7 +42,7 @@ class Profile(Enum):
 
 TIMING = ("delay", "stem_lag", "force_lag")
 """A late clock of the stem, s; a slow sensor of the stem, s; a volume before the diaphragm, or
-with the other sign a slow sensor of the pressure, s."""
+with the other sign a slow sensor of the pressure, s. Their sum is the lag of the stem."""
 
 
 @dataclass(frozen=True)
@@ -131,7 +131,7 @@ def sensor_span(force: NDArray[np.float64]) -> float:
 
 
 def deviations(
-    timing_uncertainty: float,
+    timing: float,
     assumed_mass: float,
     dry_friction: float,
     minutes: float,
@@ -140,18 +140,17 @@ def deviations(
 ) -> dict[str, float]:
     """Return the standard deviation of each prior in the coordinate's own unit.
 
-    `timing_uncertainty` is that of the whole lag between the signals; its sources share it alike.
-    Without one they are left out, and so are the imperfections that the profile does not expect;
-    the mass of a bench lies anywhere between none and twice the assumed one, that of a plant may be
-    as large as its `diaphragm_area`, m², suggests.
+    `timing` is that of each source of a lag, s. Without one they are left out, and so are the
+    imperfections that the profile does not expect; the mass of a bench lies anywhere between none
+    and twice the assumed one, that of a plant may be as large as its `diaphragm_area` suggests, m².
     """
     own = {name: one.deviation for name, one in IMPERFECTIONS.items()}
     own["mass"] = max(own["mass"] * assumed_mass, MASS_PER_AREA * diaphragm_area)
     own["slip_force"] *= dry_friction
     own["drift"] = zero_drift(1.0, minutes)
     for name in TIMING:
-        if timing_uncertainty > 0:
-            own[name] *= timing_uncertainty / math.sqrt(len(TIMING))
+        if timing > 0:
+            own[name] *= timing
         else:
             del own[name]
     if profile.has_imperfections:

@@ -18,7 +18,13 @@ from numpy.typing import NDArray
 
 from valve_friction_ros.identification.engine.broad_model import SWINGING, BroadModel
 from valve_friction_ros.identification.engine.coordinates import MAIN, Coordinates
-from valve_friction_ros.identification.engine.imperfections import IMPERFECTIONS, TIMING
+from valve_friction_ros.identification.engine.imperfections import TIMING
+from valve_friction_ros.identification.engine.lags import (
+    LagPrior,
+    LagProfile,
+    mixture_half_width,
+    spread_of,
+)
 from valve_friction_ros.identification.engine.numbers import (
     RECTANGLE,
     ReportedNumber,
@@ -29,11 +35,12 @@ from valve_friction_ros.identification.engine.posterior_fit import PosteriorFit,
 from valve_friction_ros.identification.engine.weights import stroke_cells
 from valve_friction_ros.identification.trust.sliding import FINEST_SLIDING
 from valve_friction_ros.identification.trust.uncertainty import NORMAL_QUANTILE
-from valve_friction_ros.identification.trust.verdict import WEAK_SHARE
 from valve_friction_ros.identification.units import SLIDING
 
 NumbersAt = Callable[[BroadModel, Coordinates], Mapping[str, ReportedNumber]]
 """Function of a model and a place of its fit: numbers by name."""
+
+_Known = Mapping[PosteriorFit, ReportedNumber]
 
 NOISE_LIKE = 4.0
 """Inflation of the residual up to which it may be noise of a sensor that is not quite white."""
@@ -44,13 +51,8 @@ NOT_QUITE = 1.5
 What the model lacks may then be taken for a lag, which the work of the measured signals does not
 know; with noise alone the inflation is 1.0 to 1.3."""
 
-_FAR_BEYOND, _BEYOND = 2.0, 1.1
-"""Half widths beyond which a less probable explanation is named; and how far an interval reaches to
-a nearer one, over its distance: no more is known of where that is."""
-
-_ODDS = 6.0
-"""Rise of the sum of squares (odds of 1 to 20) up to which a stem without viscous friction behind a
-slow sensor counts beside one with it, or one with it beside one without: no valley joins them."""
+_FAR_BEYOND = 2.0
+"""Half widths beyond which a less probable explanation is named."""
 
 _FOLLOWS = 10.0
 """Inflation of the residual over that of the best fit up to which another one follows the stem, as
@@ -59,10 +61,6 @@ few steps lead to it."""
 UNLIKELY = 12.0
 """Penalty of the priors beyond which a fit is doubted: such imperfections together are two
 standard deviations and more above what their number makes usual."""
-
-_WIDEST = 3.0
-"""Half width at another place, over that at the first, up to which it counts: a fit begins at
-places where the linear model says little."""
 
 _LOST = 0.5
 """Share by which the sliding friction of what was lost in gaps may differ from the mean."""
@@ -151,22 +149,6 @@ class Estimated:
         """Whether that lies far beyond the interval."""
         return abs(self.rival - self.value) > _FAR_BEYOND * self.half_width
 
-    @property
-    def with_rival(self) -> "Estimated":
-        """The same; where it is weak anyway, its interval reaches beyond a rival that is near.
-
-        The sensor is that of any other record of the valve, which is then wrong alike.
-        """
-        reach = _BEYOND * abs(self.rival - self.value)
-        if self.half_width <= WEAK_SHARE * abs(self.value) or self.has_rival:
-            return self
-        if not reach > self.half_width:
-            return self
-        more = math.sqrt(reach**2 - self.half_width**2) / NORMAL_QUANTILE
-        timing, shared = (math.hypot(one, more) for one in (self.budget.timing, self.budget.shared))
-        budget = replace(self.budget, timing=timing, shared=shared)
-        return replace(self, half_width=reach, budget=budget)
-
 
 def _vector(fit: PosteriorFit, number: ReportedNumber) -> NDArray[np.float64]:
     return np.array([number.gradient.get(name, 0.0) for name in fit.names])
@@ -187,21 +169,27 @@ def _budget(fit: PosteriorFit, stage: Stage, number: ReportedNumber) -> Budget:
     return Budget(math.sqrt(rest), math.sqrt(timing), sources, math.sqrt(timing))
 
 
-def _half_width(fit: PosteriorFit, stage: Stage, number: ReportedNumber) -> float:
-    """Half width at one place; what the fit has not done yet is added in full.
+def _deviation(fit: PosteriorFit, number: ReportedNumber) -> float:
+    """Deviation of a number at one place and its lag; what the fit has not done yet is added.
 
     Where the stem swings, or slips between two samples, F_v is taken to be unknown by the delay k·τ
     that a lag makes up for.
     """
+    stage = fit.stages[-1]
     gradient = _vector(fit, number)
-    variance = float(gradient @ stage.covariance @ gradient) + number.definition**2
+    along = stage.covariance @ gradient
+    variance = float(gradient @ along) + number.definition**2
+    if (lags := fit.lags).any():
+        variance -= float(lags @ along) ** 2 / max(
+            float(lags @ stage.covariance @ lags), np.finfo(float).tiny
+        )
     if "delay" in fit.names:
         lag = fit.precision[fit.names.index("delay")] ** -0.5 if _swings(stage) else 0.0
         lag = math.hypot(lag, _unseen_moment(fit) if stage.at["slip_force"] > 0.0 else 0.0)
         viscous = number.gradient.get("viscous_friction", 0.0)
         variance += (viscous * stage.at["spring_constant"] * lag) ** 2
-    left = abs(float(gradient @ _possible(fit)))
-    return NORMAL_QUANTILE * math.sqrt(max(variance, 0.0)) + left
+    left = abs(float(gradient @ _possible(fit))) / NORMAL_QUANTILE
+    return math.hypot(math.sqrt(max(variance, 0.0)), left)
 
 
 def _unseen_moment(fit: PosteriorFit) -> float:
@@ -227,15 +215,6 @@ def _possible(fit: PosteriorFit) -> NDArray[np.float64]:
     return np.clip(fit.remaining, -bounds, bounds)
 
 
-def _chance(fit: PosteriorFit) -> float:
-    """Fall of the sum of squares that the imperfections bring though there are none, at most.
-
-    It is χ² distributed with as many degrees of freedom: two standard deviations above its mean.
-    """
-    count = max(sum(name in IMPERFECTIONS for name in fit.names), 1)
-    return count + 2.0 * math.sqrt(2.0 * count)
-
-
 def has_tried_lags(fits: Sequence[PosteriorFit]) -> bool:
     """Return whether the search could trade viscous friction for lag, where either is unknown."""
     names = fits[0].names
@@ -243,67 +222,99 @@ def has_tried_lags(fits: Sequence[PosteriorFit]) -> bool:
 
 
 def estimated(
-    fits: Sequence[PosteriorFit], numbers_at: NumbersAt = reported_numbers
+    fits: Sequence[PosteriorFit],
+    numbers_at: NumbersAt = reported_numbers,
+    lag: LagPrior | None = None,
 ) -> dict[str, Estimated]:
-    """Return numbers with their intervals, of the best fit and its competitors.
+    """Return numbers with their intervals, of the best fit and of those held at other lags.
 
-    `numbers_at` says what the numbers are at a place of a fit; by default the reported ones.
-
-    Of the places that the best fit came by, and of the ends of the others, those count whose
-    probability chance may have lowered. Among those with all coordinates, and with a viscous
-    friction that keeps the stem from swinging, the one with the least imperfections gives the
-    values. The intervals reach to what the others say, the less probable ones less far: along a
-    bent valley the linear model at one place sees too little. Where the residual is more than
-    noise, or the imperfections are larger than usual, the interval of the sliding friction also
-    holds what the measured signals alone say (`loop_friction`).
+    `numbers_at` says what the numbers are at a place of a fit; by default the reported ones. Each
+    is integrated over the lag: by its likelihood (`LagProfile`) and the `lag` prior, unless that is
+    a stated one, which the fits hold already. Where the residual is more than noise, or the
+    imperfections are larger than usual, the interval of the sliding friction also holds what the
+    measured signals alone say (`loop_friction`).
     """
-    fit = fits[0]
-    stages = [(fit, stage) for stage in fit.stages]
-    stages += [(other, other.stages[-1]) for other in fits[1:]]
-    costs = [stage.misfit / fit.inflation + stage.penalty for _, stage in stages]
-    least, chance = min(costs), _chance(fit) * fit.inflation
-    places = [
-        (*stage, cost - least)
-        for stage, cost in zip(stages, costs, strict=True)
-        if cost - least < (chance if _swings(stage[1]) == _swings(fit.stages[-1]) else _ODDS)
-    ]
-    places.sort(
-        key=lambda place: (place[0].names != fit.names, _swings(place[1]), place[1].penalty)
-    )
-    readings = [numbers_at(fit.model, stage.at) for _, stage, _ in places]
+    fit, profile = fits[0], LagProfile.of(fits)
     late = _least_viscous(fits, numbers_at)
-    result = {}
-    for name, first in readings[0].items():
-        own = width = _half_width(*places[0][:2], first)
-        for (other, stage, behind), numbers in zip(places[1:], readings[1:], strict=True):
-            if name not in numbers:
-                continue
-            near = math.sqrt(max(1.0 - behind / chance, 0.0))
-            apart = abs(numbers[name].value - first.value)
-            there = min(_half_width(other, stage, numbers[name]), _WIDEST * own)
-            width = max(width, near * (apart + 0.5 * there))
+    if profile is None:
+        here = numbers_at(fit.model, fit.at)
+        found = {
+            name: Estimated(
+                one.value,
+                NORMAL_QUANTILE * _deviation(fit, one),
+                _budget(fit, fit.stages[-1], one),
+                late.get(name, one).value,
+            )
+            for name, one in here.items()
+        }
+    else:
+        found = _over_lags(profile, numbers_at, lag or LagPrior(), late)
+    for name, one in found.items():
+        width = one.half_width
         if name == SLIDING:
             lost = fit.model.record.lost / fit.model.record.duration
-            width = math.hypot(width, _LOST * lost * abs(first.value))
-            loop = loop_friction(fit.model, places[0][1].at)
-            apart = abs(loop - first.value)
+            width = math.hypot(width, _LOST * lost * abs(one.value))
+            loop = loop_friction(fit.model, fit.at)
+            apart = abs(loop - one.value)
             unlike = fit.inflation > NOT_QUITE or fit.stages[-1].penalty > UNLIKELY
-            unlike &= any(timing in fit.names for timing in TIMING)
+            unlike &= bool(fit.lags.any())
             if unlike or apart > _FAR * abs(loop):
-                width = math.hypot(width, apart + _LOOP * abs(first.value))
-        width = max(width, _FINEST.get(name, _FINEST_OTHER) * abs(first.value))
-        budget = _budget(*places[0][:2], first)
-        result[name] = Estimated(first.value, width, budget, late.get(name, first).value)
-    return result
+                width = math.hypot(width, apart + _LOOP * abs(one.value))
+        width = max(width, _FINEST.get(name, _FINEST_OTHER) * abs(one.value))
+        found[name] = replace(one, half_width=width)
+    return found
+
+
+def _over_lags(
+    profile: LagProfile,
+    numbers_at: NumbersAt,
+    lag: LagPrior,
+    late: Mapping[str, ReportedNumber],
+) -> dict[str, Estimated]:
+    """Integrate each number of the likeliest fit over the lag."""
+    best, stage = profile.best, profile.best.stages[-1]
+    places = {fit: numbers_at(fit.model, fit.at) for fit in (*profile.fits, *profile.apart)}
+    prior = lag if lag.deviation is None else LagPrior(math.inf)
+    probability = prior.probability(profile.log_likelihood)
+    unsaid = 1.0 - spread_of(probability) ** 2 / spread_of(np.exp(profile.log_likelihood)) ** 2
+    lags = best.lags
+    along = stage.covariance @ lags / float(lags @ stage.covariance @ lags)
+    found = {}
+    for name, first in numbers_at(best.model, best.at).items():
+        known = {fit: numbers.get(name, first) for fit, numbers in places.items()}
+
+        def value(fit: PosteriorFit, known: _Known = known) -> float:
+            return known[fit].value
+
+        def deviation(fit: PosteriorFit, known: _Known = known) -> float:
+            return _deviation(fit, known[fit])
+
+        values = profile.along(value, float(_vector(best, first) @ along))
+        own = profile.along(deviation, 0.0)
+        mean = float(probability @ values)
+        timing = math.sqrt(float(probability @ (values - mean) ** 2))
+        budget = _budget(best, stage, first)
+        found[name] = Estimated(
+            mean,
+            mixture_half_width(probability, values, own),
+            Budget(
+                math.sqrt(float(probability @ own**2)),
+                timing,
+                budget.sources,
+                timing * math.sqrt(max(unsaid, 0.0)),
+            ),
+            late.get(name, first).value,
+        )
+    return found
 
 
 def _least_viscous(
     fits: Sequence[PosteriorFit], numbers_at: NumbersAt
 ) -> Mapping[str, ReportedNumber]:
-    """Return the numbers of the fit with the least viscous friction that follows the stem too.
+    """Return the numbers of a fit apart with less viscous friction, if it follows the stem too.
 
     However large its lags are: how probable they are is another question.
     """
-    able = [fit for fit in fits if fit.inflation <= _FOLLOWS * fits[0].inflation]
-    last = min(able, key=lambda fit: fit.at["viscous_friction"])
+    able = [fit for fit in fits if fit.is_apart and fit.inflation <= _FOLLOWS * fits[0].inflation]
+    last = min((fits[0], *able), key=lambda fit: fit.at["viscous_friction"])
     return numbers_at(last.model, last.at)

@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from valve_friction_ros.identification.engine.balance_regression import SECOND_ORDER, LagPrior
+from valve_friction_ros.identification.engine.balance_regression import SECOND_ORDER
 from valve_friction_ros.identification.engine.departures import Departed, static_friction
 from valve_friction_ros.identification.engine.fitted_record import fitted_record
 from valve_friction_ros.identification.engine.friction_curve import (
@@ -27,6 +27,7 @@ from valve_friction_ros.identification.engine.friction_curve import (
     curve_evidence,
     curve_numbers,
     friction_curves,
+    timed_numbers,
 )
 from valve_friction_ros.identification.engine.imperfections import Profile
 from valve_friction_ros.identification.engine.intervals import (
@@ -37,6 +38,7 @@ from valve_friction_ros.identification.engine.intervals import (
     estimated,
     has_tried_lags,
 )
+from valve_friction_ros.identification.engine.lags import LagPrior, LagProfile
 from valve_friction_ros.identification.engine.numbers import (
     ASYMMETRY,
     found_sizes,
@@ -67,7 +69,6 @@ from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.identification.result import Result, StemComparison
 from valve_friction_ros.identification.settings import (
     REGRESSED,
-    TIMING_UNCERTAINTY,
     IdentificationSettings,
 )
 from valve_friction_ros.identification.trust.calibration import BUDGET, COVERAGE
@@ -321,7 +322,7 @@ def _of_simulation(
     prior = prior_of(settings, profile, valve)
     static = math.nan if departed is None else departed.static_friction.value
     fits = search(fitted_record(record, valve), prior, curves, static)
-    fit, numbers = fits[0], estimated(fits, numbers_of(profile))
+    fit, numbers = fits[0], estimated(fits, numbers_of(profile), prior.lag)
     misfit = fit_misfit(fit, numbers, profile)
     if misfit.is_gross:
         raise RefusalError(
@@ -333,11 +334,12 @@ def _of_simulation(
     follows = fit.inflation <= NOISE_LIKE and has_tried_lags(fits)
     if profile.has_imperfections:
         is_exact = fit.inflation <= NOT_QUITE
+        if is_exact:
+            balanced = timed_numbers(curves, LagProfile.of(fits))
         numbers = checked_by_curve(numbers, balanced, follows, fit.at["slip_force"], is_exact)
-        if "mass" in numbers and prior.timing_uncertainty > 0:
+        if "mass" in numbers and not prior.lag.is_known:
             numbers["mass"] = _beside_lags(numbers["mass"], fit.at["spring_constant"])
         misfit = fit_misfit(fit, numbers)
-    numbers[SLIDING] = numbers[SLIDING].with_rival
     return _Outcome(
         parameters=fit_verdicts(fits, numbers, settings, misfit, profile),
         numbers=numbers,
@@ -349,7 +351,7 @@ def _of_simulation(
             "noise",
         ),
         warnings=found_imperfections(fit),
-        imperfections=estimated(fits, found_sizes),
+        imperfections=estimated(fits, found_sizes, prior.lag),
         correlation=_correlation(fit, numbers_of(profile)),
         model=_model(fit),
         stem=_stem(fit, record),
@@ -417,7 +419,6 @@ def _of_force_balance(
 ) -> _Outcome:
     """Take the force balance of the sliding stem alone; `why` says why none was simulated."""
     numbers = {name: one for name, one in numbers.items() if name != SPEED_EXPONENT}
-    numbers[SLIDING] = numbers[SLIDING].with_rival
     best = next(one for one in curves if one.numbers[SLIDING].value == numbers[SLIDING].value)
     misfit = curve_misfit(best, numbers[SLIDING])
     reproduced = f"the force balance reproduces {100 * misfit.fit:.2f} % of the force"
@@ -506,14 +507,11 @@ def prior_of(
 ) -> Prior:
     """Return what is known before a record is seen, of any valve or of that one."""
     known = known_of(settings)
-    timing = settings.timing_uncertainty
-    if timing is None:
-        timing = TIMING_UNCERTAINTY if profile.has_imperfections else 0.0
     area = 0.0
     if valve is not None and settings.assumed_mass == IdentificationSettings.assumed_mass:
         area = valve.diaphragm_area or 0.0
     mass = known.get("mass", settings.assumed_mass)
-    return Prior(timing, mass, known, profile, area)
+    return Prior(lag_prior_of(settings, profile), mass, known, profile, area)
 
 
 def numbers_of(profile: Profile) -> NumbersAt:

@@ -11,6 +11,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +23,7 @@ from valve_friction_ros.identification.engine.coordinates import (
     physical,
     straight,
 )
-from valve_friction_ros.identification.engine.imperfections import BOUNDS
+from valve_friction_ros.identification.engine.imperfections import BOUNDS, TIMING
 from valve_friction_ros.identification.engine.weights import inflation, stroke_cells
 
 _ROUNDS = 12
@@ -80,8 +81,17 @@ In right fits of 13 records of a benchmark it is 0.2 to 1.04."""
 
 _LARGEST_CHANGE = 0.5
 _LEAST_COMMON = 0.01
+_RISES = 1
+"""Steps upwards that a fit at a held lag may take between two places lower than all before.
+
+Where a stem sticks or breaks away the sum of squares has kinks, which hold a fit that only falls.
+"""
+
 _UNSEEN = 1e-15
 """Least curvature over the largest: what the record does not see at all is unknown, not certain."""
+
+_PINNED = 1e-4
+"""Deviation, s, by which a lag may differ from the one at which a fit pins it."""
 
 _BLOCK = 512
 _MOVED = ("coulomb_friction", "viscous_friction", "spring_constant", "spring_preload", "slip_force")
@@ -131,6 +141,8 @@ class PosteriorFit:
         Measured less simulated readings, m, the mean of both halves.
     kept : tuple of str
         Free coordinates that stay where their priors are centred, and widen the intervals only.
+    is_apart : bool
+        Whether no valley leads to it from the best fit.
     """
 
     model: BroadModel
@@ -141,6 +153,7 @@ class PosteriorFit:
     remaining: NDArray[np.float64] = field(repr=False)
     residual: NDArray[np.float64] = field(repr=False)
     kept: tuple[str, ...] = ()
+    is_apart: bool = False
 
     @property
     def at(self) -> Coordinates:
@@ -151,6 +164,25 @@ class PosteriorFit:
     def objective(self) -> float:
         """Squares of residuals and of distances from the priors together."""
         return self.stages[-1].misfit + self.stages[-1].penalty
+
+    def cost(self, inflation: float) -> float:
+        """Return the same with the squares of residuals over an inflation."""
+        return self.stages[-1].misfit / inflation + self.stages[-1].penalty
+
+    @property
+    def lag(self) -> float:
+        """Time by which the stem is seen late in all, s."""
+        return lag_of(self.at)
+
+    @property
+    def lags(self) -> NDArray[np.float64]:
+        """One for each free coordinate that is part of the lag, shape (p,), else zero."""
+        return np.array([float(name in TIMING) for name in self.names])
+
+
+def lag_of(at: Coordinates) -> float:
+    """Return the time by which the stem is seen late in all, s."""
+    return sum(at[name] for name in TIMING)
 
 
 def _misfit(model: BroadModel, residual: NDArray[np.float64]) -> float:
@@ -198,10 +230,11 @@ class _Problem:
         deviations: Mapping[str, float],
         centre: Coordinates,
         readings: NDArray[np.float64],
+        pinned: float | None,
     ) -> None:
         record = model.record
         self.model, self.at, self.names = model, at, names
-        self.centre, self.deviations = centre, deviations
+        self.centre, self.deviations, self.pinned = centre, deviations, pinned
         self.residual = record.position - readings
         scaled = self.residual * model.weights
         self.inflation = inflation(scaled.mean(axis=0), stroke_cells(record))
@@ -214,13 +247,19 @@ class _Problem:
         even, odd = model.sensitivity(at, names, readings) * model.weights
         same, apart = _products(even + odd), _products(even - odd)
         own, cross = 0.25 * (same + apart), 0.25 * (same - apart)
-        diagonal = np.diag(own) / self.inflation + self.precision * size**2
+        precision = np.diag(self.precision * size**2)
+        pull = -self.precision * size * self.distance
+        if pinned is not None:
+            lags = np.array([float(name in TIMING) for name in names])
+            precision += np.outer(lags, lags) / _PINNED**2
+            pull -= lags * (lag_of(at) - pinned) / _PINNED**2
+        diagonal = np.diag(own) / self.inflation + np.diag(precision)
         self.scale = np.where(diagonal > 0, np.sqrt(np.abs(diagonal)), 1.0)
         outer = np.outer(self.scale, self.scale) * self.inflation
         information = _common(own / outer, cross / outer)
-        self.curvature = information + np.diag(self.precision * size**2 / self.scale**2)
+        self.curvature = information + precision / np.outer(self.scale, self.scale)
         gradient = 0.5 * np.sum(even * scaled[1] + odd * scaled[0], axis=1) / self.inflation
-        self.slope = (gradient - self.precision * size * self.distance) / self.scale
+        self.slope = (gradient + pull) / self.scale
         self.straight = straight(at, names)
         lowest = [BOUNDS.get(name, -np.inf) - self.straight[name] for name in names]
         self.lowest = np.minimum(np.array(lowest) * self.scale, 0.0)
@@ -244,9 +283,15 @@ class _Problem:
         scaled = step * self.scale
         return float(2.0 * self.slope @ scaled - scaled @ self.curvature @ scaled)
 
+    @property
+    def here(self) -> float:
+        """The objective at the place itself."""
+        return self.objective(self.at, self.model.record.position - self.residual)
+
     def objective(self, at: Coordinates, readings: NDArray[np.float64]) -> float:
         misfit = _misfit(self.model, self.model.record.position - readings)
-        return misfit / self.inflation + self.penalty(at)
+        away = 0.0 if self.pinned is None else (lag_of(at) - self.pinned) / _PINNED
+        return misfit / self.inflation + self.penalty(at) + away**2
 
     def penalty(self, at: Coordinates) -> float:
         """Squared distances from the priors, those of coordinates that are not free among them."""
@@ -273,19 +318,28 @@ class _Problem:
         return share
 
 
-def _descended(problem: _Problem) -> tuple[dict[str, float], NDArray[np.float64], float] | None:
-    """Take the first step that leads down; return the place, its readings and the fall."""
-    now = problem.objective(problem.at, problem.model.record.position - problem.residual)
+class _Move(NamedTuple):
+    """A step of a fit: where it leads, the readings there, and how far the objective falls."""
+
+    at: dict[str, float]
+    readings: NDArray[np.float64]
+    fall: float
+
+
+def _descended(problem: _Problem) -> _Move:
+    """Take the first step that leads down, or the one that leads up the least."""
+    now, moves = problem.here, []
     for damping in _DAMPINGS:
         step = problem.step(damping)
         share = problem.largest_share(step)
         for shorter in _SHORTER if damping == 0 else (1.0,):
             there = problem.moved(share * shorter * step)
             readings = problem.model.readings(there)
-            then = problem.objective(there, readings)
-            if then < now:
-                return there, readings, now - then
-    return None
+            move = _Move(there, readings, now - problem.objective(there, readings))
+            if move.fall > 0.0:
+                return move
+            moves.append(move)
+    return max(moves, key=lambda one: one.fall)
 
 
 def fit(
@@ -295,6 +349,7 @@ def fit(
     deviations: Mapping[str, float],
     centre: Coordinates,
     steps: int,
+    pinned: float | None = None,
 ) -> PosteriorFit:
     """Go down from `start` to the most probable coordinates, by Gauss–Newton's method.
 
@@ -324,21 +379,24 @@ def fit(
         Their means; 0 where none is given.
     steps : int
         Steps at most; with 0 the posterior at `start` is told.
+    pinned : float, optional
+        Lag in all, s, that the fit keeps.
     """
     at = dict(start)
-    problem = _Problem(model, at, names, deviations, centre, model.readings(at))
-    stages = [problem.stage()]
+    problem = _Problem(model, at, names, deviations, centre, model.readings(at), pinned)
+    best, stages, risen, rises = problem, [problem.stage()], 0, 0 if pinned is None else _RISES
     for _ in range(steps):
         if problem.gain(problem.step(0.0)) < _WORTH:
             break
-        found = _descended(problem)
-        if found is None:
+        move = _descended(problem)
+        problem = _Problem(model, move.at, names, deviations, centre, move.readings, pinned)
+        risen = 0 if best.objective(move.at, move.readings) < best.here else risen + 1
+        if not risen:
+            best = problem
+            stages.append(problem.stage())
+        if risen > rises or abs(move.fall) < _WORTH:
             break
-        at, readings, fall = found
-        problem = _Problem(model, at, names, deviations, centre, readings)
-        stages.append(problem.stage())
-        if fall < _WORTH:
-            break
+    problem = best
     remaining = problem.jacobian @ problem.step(0.0)
     return PosteriorFit(
         model,

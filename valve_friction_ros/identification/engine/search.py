@@ -28,8 +28,9 @@ from valve_friction_ros.identification.engine.imperfections import (
     Profile,
     deviations,
 )
-from valve_friction_ros.identification.engine.intervals import UNLIKELY
-from valve_friction_ros.identification.engine.posterior_fit import PosteriorFit, fit
+from valve_friction_ros.identification.engine.intervals import NOISE_LIKE, UNLIKELY
+from valve_friction_ros.identification.engine.lags import LARGEST_LAG, LagPrior
+from valve_friction_ros.identification.engine.posterior_fit import PosteriorFit, fit, lag_of
 from valve_friction_ros.identification.refusal import RefusalError
 
 _SLIDING = 0.15
@@ -146,7 +147,7 @@ _START_TIME = 5e-3
 """The first position is known to so many deviations of its noise, and to what the stem moves in
 such a time (s) and in that by which its sensor may be late."""
 
-_MOST_WORK, _FOR_LAGS = 44_000_000, 10_000_000
+_MOST_WORK, _FOR_LAGS = 36_000_000, 10_000_000
 """Steps of simulations after which no other branch begins, and what is left for other lags after
 them: a second of a processor or so, and a third of one.
 
@@ -159,11 +160,12 @@ _COARSENESS = 100.0
 """Of the derivatives until a fit is near its end."""
 
 _FEWEST_STEPS = 2
-_TRADED = (0.25, 0.5, 1.0)
-_TRADED_STEPS = 6
-_IMPROBABLE = 25.0
-"""Steps along that valley each way, shares of the timing uncertainty; steps of a fit there; and the
-rise of the sum of squares after which the valley is left."""
+_PROFILE, _PROFILE_STEPS = 3, 4
+_LEAST_STEP, _LARGEST_STEP = 5e-4, 20e-3
+_IMPROBABLE, _LEAST_LEFT = 16.0, 0.1
+"""Lags each way at which the likelihood is followed, and steps of a fit there; least and largest of
+the first step along the lag, s, which is one deviation by the linear model; the rise of the cost
+after which the next lag lies nearer; and the share of a force that a start keeps."""
 
 _DEMANDED = 30.0
 """Fall of the sum of squares, in inflated variances (5.5 standard errors), below which no record
@@ -179,8 +181,8 @@ class Prior:
 
     Attributes
     ----------
-    timing_uncertainty : float
-        Standard deviation of the time by which one signal may lag the other in all, s.
+    lag : LagPrior
+        Of the time by which the stem is seen late.
     mass : float
         Mass to be expected, kg.
     fixed : mapping of str to float
@@ -192,7 +194,7 @@ class Prior:
         mass was stated.
     """
 
-    timing_uncertainty: float
+    lag: LagPrior
     mass: float
     fixed: Mapping[str, float]
     profile: Profile = Profile.PLANT
@@ -213,13 +215,14 @@ class _Search:
         self.curves, self.static_friction = curves, static_friction
         self.prior = prior
         self.sliding = sliding(record)
+        if prior.profile.has_imperfections:
+            record = set_anew_at_rests(record)
         self.exact = BroadModel(record, self.sliding.spring_constant)
         self.model = replace(self.exact, coarseness=_COARSENESS)
-        self.stepwise = replace(self.exact, record=set_anew_at_rests(record))
         self.known = dict(prior.fixed)
         self.centre = {"mass": prior.mass}
         self.spread = deviations(
-            prior.timing_uncertainty,
+            prior.lag.deviation_of_each,
             prior.mass,
             self.sliding.friction,
             record.duration / 60,
@@ -227,7 +230,7 @@ class _Search:
             prior.diaphragm_area,
         )
         self.centre["start_position"] = record.start
-        late = _START_TIME + 2.0 * prior.timing_uncertainty
+        late = _START_TIME + 2.0 * prior.lag.deviation_of_all
         self.spread["start_position"] = _START_NOISE * record.noise + late * abs(
             float(record.leaving[0])
         )
@@ -253,6 +256,7 @@ class _Search:
         names: tuple[str, ...],
         steps: int,
         model: BroadModel | None = None,
+        pinned: float | None = None,
     ) -> PosteriorFit:
         """Fit from a start, and count the work."""
         start, model = {**start, **self.known}, model or self.model
@@ -266,6 +270,7 @@ class _Search:
             self.spread,
             self.centre,
             min(steps, max(allowed, _FEWEST_STEPS)),
+            pinned,
         )
         self.work += len(found.stages) * a_step
         return found
@@ -314,10 +319,10 @@ class _Search:
         starts = self.from_curves()
         if not starts:
             return None
-        near = nearest(self.stepwise, starts)[0]
-        near = nearest(self.stepwise, self.falling(near))[0]
+        near = nearest(self.exact, starts)[0]
+        near = nearest(self.exact, self.falling(near))[0]
         own = ("slip_force", "stribeck_velocity")
-        first = self.fit(near, (*self.main, *own), _MORE_STEPS, self.stepwise)
+        first = self.fit(near, (*self.main, *own), _MORE_STEPS, self.exact)
         if not self.may_go_on:
             return None
         return self.fit(first.at, self.free(first.at), 2 * _MORE_STEPS, self.exact)
@@ -386,48 +391,67 @@ class _Search:
             return plain
         return self.fit(plain.at, best.names, 0, self.exact)
 
-    def traded(self, best: PosteriorFit) -> list[PosteriorFit]:
-        """Fit with other viscous frictions: F_v/k delays a sliding stem much as a lag does.
+    def profiled(self, best: PosteriorFit) -> list[PosteriorFit]:
+        """Fit with other lags, each held, both ways from the best one and at none.
 
-        The two trade places along a valley that is too bent for the linear model at its deepest
-        point. Both ways along it the fit goes as far as the timing is uncertain, or until it is
-        improbable. And a slow sensor of the stem may make up for all viscous friction; half of each
-        does not, so that no valley leads there.
+        F_v/k delays a sliding stem as a lag does. The two trade places along a valley that is too
+        bent for the linear model at its deepest point, so each fit begins at its neighbour. And a
+        slow sensor of the stem may make up for all viscous friction; no valley leads there. A stem
+        that the best fit does not follow tells no lag.
         """
-        lag = self.prior.timing_uncertainty
-        if lag == 0.0 or "viscous_friction" not in best.names:
+        if not best.lags.any():
             return []
         self.most_work = max(self.most_work, self.work + _FOR_LAGS)
-        names = tuple(
-            name
-            for name in best.names
-            if name in (*MAIN, *TIMING, "mass", "slip_force") and name != "viscous_friction"
-        )
-
-        def with_delay(fit: PosteriorFit, delay: float) -> PosteriorFit | None:
-            own = _delay(fit)
-            delay = max(delay, min(own, SWINGING))
-            if not (delay != own and self.may_go_on):
-                return None
-            steps, late = _TRADED_STEPS, {"force_lag": fit.at["force_lag"] + own - delay}
-            if delay <= SWINGING:
-                whole = own - delay + sum(fit.at[name] for name in TIMING)
-                steps, late = _MORE_STEPS, {"delay": 0.0, "force_lag": 0.0, "stem_lag": whole}
-            late["viscous_friction"] = fit.at["spring_constant"] * delay
-            return self.fit({**fit.at, **late}, names, steps, self.exact)
-
-        exchanged = with_delay(best, 0.0)
-        found = [] if exchanged is None else [exchanged]
-        for way in (-1.0, 1.0):
-            last: PosteriorFit | None = best
-            for share in _TRADED:
-                last = with_delay(last, _delay(last) - way * share * lag) if last else None
-                if last is None:
-                    break
-                found.append(last)
-                if last.objective - best.objective > _IMPROBABLE * best.inflation**2:
-                    break
+        follows, found = best.inflation <= NOISE_LIKE, []
+        if follows:
+            found = [*self.followed(best, -1.0), *self.followed(best, 1.0)]
+        nearest_to_none = min([best, *found], key=lambda one: abs(one.lag))
+        if abs(nearest_to_none.lag) > 0.5 * _first_step(best) and self.may_go_on:
+            found.append(self.held(best, nearest_to_none.at, 0.0))
+        is_possible = best.lag + _delay(best) < LARGEST_LAG
+        if follows and is_possible and "viscous_friction" in best.names and self.may_go_on:
+            found.append(self.behind_slow_sensor(best))
         return found
+
+    def followed(self, best: PosteriorFit, way: float) -> list[PosteriorFit]:
+        """Fit with later lags, or earlier ones, each from the last that is probable."""
+        found: list[PosteriorFit] = []
+        last, step = best, _first_step(best)
+        for _ in range(_PROFILE):
+            lag = last.lag + way * step
+            if not (self.may_go_on and abs(lag) < LARGEST_LAG):
+                break
+            found.append(self.held(best, last.at, lag))
+            if found[-1].cost(best.inflation) - best.cost(best.inflation) < _IMPROBABLE:
+                last, step = found[-1], 2.0 * step
+            elif step > _LEAST_STEP:
+                step /= 4.0
+        return found
+
+    def held(self, best: PosteriorFit, at: Coordinates, lag: float) -> PosteriorFit:
+        """Fit with one lag, s, from where the linear model of the best fit leads from a place."""
+        along = best.stages[-1].covariance @ best.lags
+        along /= max(float(best.lags @ along), np.finfo(float).tiny)
+        start = dict(at)
+        for name, share in zip(best.names, along.tolist(), strict=True):
+            there = start[name] + share * (lag - lag_of(at))
+            least = _LEAST_LEFT * abs(start[name]) if name in MAIN[:3] else -math.inf
+            start[name] = max(there, least, BOUNDS.get(name, -math.inf))
+        return self.fit(start, best.names, _PROFILE_STEPS, self.exact, lag)
+
+    def behind_slow_sensor(self, best: PosteriorFit) -> PosteriorFit:
+        """Fit a stem with hardly any viscous friction behind a slow sensor of its place."""
+        spring = best.at["spring_constant"]
+        late = best.lag + _delay(best) - SWINGING
+        start = {
+            **best.at,
+            "viscous_friction": spring * SWINGING,
+            "delay": 0.0,
+            "force_lag": 0.0,
+            "stem_lag": max(late, 0.0),
+        }
+        found = self.fit(start, best.names, _FEW_STEPS, self.exact, start["stem_lag"])
+        return replace(found, is_apart=True)
 
     def all_probable(self) -> list[PosteriorFit]:
         """Return the most probable fit, and those with which it competes."""
@@ -436,9 +460,15 @@ class _Search:
             best = self.demanded(best)
         elif self.may_go_on:
             best = self.without_slip(best)
-        others = self.traded(best)
-        lowest = min(others, key=lambda one: one.objective, default=best)
-        if lowest.objective < best.objective - 1.0:
+        others = self.profiled(best)
+        inflation = best.inflation
+
+        def cost(one: PosteriorFit) -> float:
+            """Take a stem behind a slow sensor for the best only where the record demands it."""
+            return one.cost(inflation) + (_DEMANDED if one.is_apart else 0.0)
+
+        lowest = min(others, key=cost, default=best)
+        if cost(lowest) < cost(best) - 1.0:
             deeper = self.fit(lowest.at, best.names, _MORE_STEPS, self.exact)
             if deeper.objective < best.objective:
                 best, others = deeper, [*others, best]
@@ -481,7 +511,7 @@ class _Search:
         plain = self.fit(nearest(self.model, starts)[0], names, _FEW_STEPS)
         if not self.timing:
             return plain
-        lags = [plain.at, *lagging(plain.at, self.prior.timing_uncertainty)]
+        lags = [plain.at, *lagging(plain.at, self.prior.lag.deviation_of_all)]
         near = nearest(self.model, lags)[0]
         return self.fit(near, tuple(dict.fromkeys((*names, *self.timing))), _FEW_STEPS)
 
@@ -532,6 +562,12 @@ def _fall_at_low_speed(fit: PosteriorFit) -> float:
     return fit.at["at_low_speed"] / math.sqrt(float(fit.stages[-1].covariance[index, index]))
 
 
+def _first_step(fit: PosteriorFit) -> float:
+    """Return the deviation of the lag by the linear model, s, within what a step may be."""
+    variance = float(fit.lags @ fit.stages[-1].covariance @ fit.lags)
+    return float(np.clip(math.sqrt(max(variance, 0.0)), _LEAST_STEP, _LARGEST_STEP))
+
+
 def _delay(fit: PosteriorFit) -> float:
     """Return the time by which viscous friction delays the stem, s."""
     return fit.at["viscous_friction"] / fit.at["spring_constant"]
@@ -551,8 +587,8 @@ def search(
     they do. Where that does not do either, or there is no curve, the sliding friction of a plain
     regression is split into F_c and F_v in several ways, without and with a slip; the way whose
     simulated stem is nearest starts a fit, and again with the likeliest lag. Then follows one with
-    a dead zone. At the end viscous friction is traded for lag, both ways along their common valley,
-    and all of it for a slow sensor of the stem.
+    a dead zone. At the end the likelihood is followed along the lag, which viscous friction makes
+    up for, and to a slow sensor of the stem in place of all viscous friction.
 
     Raises
     ------
@@ -586,4 +622,4 @@ def posteriors_at(
     found = _Search(record, prior)
     at = {**found.base, **truth}
     best = fit(found.exact, {**at, **found.known}, found.all, found.spread, found.centre, 0)
-    return [best, *(found.traded(best) if with_competitors else ())]
+    return [best, *(found.profiled(best) if with_competitors else ())]

@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from valve_friction_ros.identification.engine.lags import LAGS, LARGEST_LAG
 from valve_friction_ros.identification.trust.uncertainty import MEDIAN_MAGNITUDE
 from valve_friction_ros.model.recording import StampedRecord, StampedSignal
 from valve_friction_ros.model.valve import Valve
@@ -44,11 +45,8 @@ _MARGIN = 2.0
 sliding stem."""
 
 _TINY = float(np.finfo(float).tiny)
-LARGEST_LAG = 0.15
-LAGS: _Array = np.linspace(-LARGEST_LAG, LARGEST_LAG, 301, dtype=np.float64)
 WORK_LAGS: _Array = LAGS[::10]
-"""Lags over which the posterior is integrated, s, beyond which the signals are not one record; and
-those at which the work is computed."""
+"""Lags, s, at which the work is computed."""
 
 _CHANCE_OF_SPEED = 0.03
 """Largest share of chance in the mean speed."""

@@ -1,0 +1,262 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""The lag of the stem behind the force: its prior, its likelihood, and what it leaves of a number.
+
+While the stem slides, F_v/k delays it as a lag of the signals does. Rests and reversals tell them
+apart: a late stem leaves its rest late, viscous friction does not hold it. The likelihood of the
+whole lag is therefore followed through the fits of the simulated stem, each held at a lag
+(`LagProfile`), and every number is integrated over it under one heavy-tailed prior.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from valve_friction_ros.identification.engine.imperfections import TIMING
+from valve_friction_ros.identification.engine.posterior_fit import PosteriorFit
+from valve_friction_ros.identification.settings import TIMING_UNCERTAINTY
+from valve_friction_ros.identification.trust.uncertainty import CONFIDENCE
+
+_Array = NDArray[np.float64]
+
+LARGEST_LAG = 0.15
+LAGS: _Array = np.linspace(-LARGEST_LAG, LARGEST_LAG, 301, dtype=np.float64)
+"""Lags that are possible, s."""
+
+USUAL_LAG = 4e-3
+"""Scale, s, of the prior of the lag where no timing is stated, a Cauchy distribution.
+
+One controller stamps both signals to some milliseconds; damped transmitters, tubing and separate
+clocks add up to tens. Half of all plants lie within this scale, 95 % within 51 ms."""
+
+_WIDER = 5.0
+"""Scales of the lag's prior in the deviation of a Gaussian that stands for it about none."""
+
+_LEAST_DEVIATION = 5e-4
+"""Deviation, s, to which no record tells a lag better: the model has one lag, a valve many."""
+
+_NEAR = 3.0
+"""Deviations about the lag of a fit that lies apart in which its numbers hold; one that is nearer
+to the likeliest than twice as many lies in the same valley."""
+
+_LIKELY = 16.0
+"""Cost over the best up to which fits show how rough the likelihood is."""
+
+_NEGLIGIBLE, _HALVINGS = 1e-6, 24
+"""Probability of a lag that no interval notices; halvings by which an interval is found."""
+
+
+@dataclass(frozen=True)
+class LagPrior:
+    """What is known of the time by which the stem is seen late, before the record is.
+
+    Attributes
+    ----------
+    deviation : float or None
+        Standard deviation of a Gaussian, s; None for the heavy-tailed prior of a plant whose timing
+        nobody has stated.
+    """
+
+    deviation: float | None = None
+
+    @property
+    def is_known(self) -> bool:
+        """Whether there certainly is no lag."""
+        return self.deviation == 0.0
+
+    @property
+    def deviation_of_all(self) -> float:
+        """Largest deviation that is usual of the lag, s."""
+        return TIMING_UNCERTAINTY if self.deviation is None else self.deviation
+
+    @property
+    def deviation_of_each(self) -> float:
+        """Deviation of each source of a lag, s: they share a stated one, else each may have all."""
+        return self.deviation_of_all / (1.0 if self.deviation is None else math.sqrt(len(TIMING)))
+
+    def precision(self, lag: float) -> float:
+        """Return the precision, 1/s², of a Gaussian that stands for the prior at `lag`.
+
+        It is wider than the heavy-tailed one, so that a regression is not held at a lag of none.
+        """
+        if self.deviation is not None:
+            return 1.0 / max(self.deviation, 1e-9) ** 2
+        return 1.0 / ((_WIDER * USUAL_LAG) ** 2 + lag * lag)
+
+    def log_density(self, lags: _Array) -> _Array:
+        """Return the logarithm of the density at each lag, s, but for a constant."""
+        if self.deviation is not None:
+            return np.asarray(-0.5 * (lags / max(self.deviation, 1e-9)) ** 2)
+        return np.asarray(-np.log1p((lags / USUAL_LAG) ** 2))
+
+    def probability(self, log_likelihood: _Array) -> _Array:
+        """Return the probability of each of `LAGS`, by this prior and a likelihood."""
+        log = self.log_density(LAGS) + log_likelihood
+        probability = np.exp(log - log.max())
+        return np.asarray(probability / np.sum(probability))
+
+
+_DEVIATIONS: _Array = np.linspace(-9.0, 9.0, 3601, dtype=np.float64)
+_PROBABILITIES: _Array = np.array([0.5 * math.erfc(-one / math.sqrt(2.0)) for one in _DEVIATIONS])
+
+
+def normal(deviations: _Array) -> _Array:
+    """Return the normal distribution function, to 1e-6."""
+    return np.interp(deviations, _DEVIATIONS, _PROBABILITIES)
+
+
+def mixture_half_width(weights: _Array, values: _Array, deviations: _Array) -> float:
+    """Return half the width of the interval about the mean that holds `CONFIDENCE`.
+
+    Parameters
+    ----------
+    weights, values, deviations : ndarray of float, of one shape
+        Of each normal distribution of a mixture; the weights add up to one.
+    """
+    mean = float(np.sum(weights * values))
+    spread = float(np.sum(weights * (deviations**2 + (values - mean) ** 2)))
+    low, high = 0.0, 20.0 * math.sqrt(spread)
+    some = weights > _NEGLIGIBLE
+    weight, away = weights[some], mean - values[some]
+    deviation = np.maximum(deviations[some], np.finfo(float).tiny)
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        inside = normal((away + middle) / deviation) - normal((away - middle) / deviation)
+        low, high = (middle, high) if weight @ inside < CONFIDENCE else (low, middle)
+    return high
+
+
+def spread_of(density: _Array) -> float:
+    """Return the deviation of the lag by its density at `LAGS`, s, at least `_LEAST_DEVIATION`."""
+    probability = density / np.sum(density)
+    mean = float(probability @ LAGS)
+    return math.sqrt(max(float(probability @ (LAGS - mean) ** 2), _LEAST_DEVIATION**2))
+
+
+@dataclass(frozen=True, eq=False)
+class LagProfile:
+    """How likely each lag is, by fits that are held at some.
+
+    Attributes
+    ----------
+    fits : sequence of PosteriorFit
+        In the order of their lags.
+    apart : sequence of PosteriorFit
+        Those to which no valley leads from the others.
+    inflation : float
+        Of the residual of the best one, by which all are compared.
+    """
+
+    fits: Sequence[PosteriorFit]
+    apart: Sequence[PosteriorFit]
+    inflation: float
+
+    @classmethod
+    def of(cls, fits: Sequence[PosteriorFit]) -> "LagProfile | None":
+        """Return the profile of some fits; None where none has a lag, or the best an absurd one."""
+        able = [one for one in fits if one.lags.any() and not one.is_apart]
+        if not able:
+            return None
+        inflation = min(able, key=lambda one: one.objective).inflation
+        best = min(able, key=lambda one: one.cost(inflation))
+        if abs(best.lag) >= LARGEST_LAG:
+            return None
+        found: list[PosteriorFit] = []
+        for one in sorted(able, key=lambda one: one.cost(inflation)):
+            if all(abs(one.lag - other.lag) > _LEAST_DEVIATION for other in found):
+                found.append(one)
+        profile = cls(sorted(found, key=lambda one: one.lag), (), inflation)
+        reach = 2.0 * _NEAR * profile.deviation
+        apart = [
+            one
+            for one in fits
+            if one.is_apart and reach < abs(one.lag - best.lag) and abs(one.lag) < LARGEST_LAG
+        ]
+        return replace(profile, apart=apart)
+
+    @cached_property
+    def lags(self) -> _Array:
+        """Lag of each fit, s."""
+        return np.array([one.lag for one in self.fits])
+
+    @cached_property
+    def costs(self) -> _Array:
+        """Twice the negative logarithm of the likelihood of each, over the best."""
+        costs = np.array([one.cost(self.inflation) for one in self.fits])
+        return np.asarray(costs - np.min(costs))
+
+    @cached_property
+    def best(self) -> PosteriorFit:
+        """The likeliest."""
+        return self.fits[int(np.argmin(self.costs))]
+
+    @cached_property
+    def deviation(self) -> float:
+        """Deviation of the lag by the linear model of the likeliest, s."""
+        lags = self.best.lags
+        return max(
+            math.sqrt(float(lags @ self.best.stages[-1].covariance @ lags)), _LEAST_DEVIATION
+        )
+
+    @cached_property
+    def log_likelihood(self) -> _Array:
+        """Logarithm of the likelihood of each of `LAGS`, the likeliest at 0.
+
+        A fit may end at a kink above the least cost, never below it: the costs are those of their
+        lower hull, less what the fits lie above it in the mean. Their root is linear between the
+        fits, and beyond the last ones goes on as before them. A fit that lies apart is at most as
+        likely as the best one.
+        """
+        hull = _lower_hull(self.lags, self.costs)
+        likely = self.costs < _LIKELY
+        rough = float(np.mean((self.costs - hull)[likely]))
+        roots, centre = np.sqrt(np.maximum(hull - rough, 0.0)), self.best.lag
+        slopes = [1.0 / self.deviation] * 2
+        for end, at in ((0, 0), (1, -1)):
+            if self.fits[at] is not self.best:
+                slopes[end] = roots[at] / abs(self.lags[at] - centre)
+        root = np.interp(LAGS, self.lags, roots)
+        before, after = self.lags[0] - LAGS, LAGS - self.lags[-1]
+        root = root + slopes[0] * np.maximum(before, 0.0) + slopes[1] * np.maximum(after, 0.0)
+        log = -0.5 * root**2
+        for one in self.apart:
+            rise = max(one.cost(self.inflation) - self.best.cost(self.inflation), 0.0)
+            log = np.logaddexp(log, -0.5 * (rise + ((LAGS - one.lag) / self.deviation) ** 2))
+        return np.asarray(log)
+
+    def along(self, number: Callable[[PosteriorFit], float], slope: float) -> _Array:
+        """Return a number of each fit at each of `LAGS`.
+
+        Beyond the fits it has the `slope` that the linear model of the likeliest tells.
+        """
+        values = np.interp(LAGS, self.lags, [number(one) for one in self.fits])
+        values += slope * np.minimum(LAGS - self.lags[0], 0.0)
+        values += slope * np.maximum(LAGS - self.lags[-1], 0.0)
+        for one in self.apart:
+            values[np.abs(LAGS - one.lag) < _NEAR * self.deviation] = number(one)
+        return values
+
+
+def _lower_hull(places: _Array, heights: _Array) -> _Array:
+    """Return the lower convex hull of points in the order of their places, at each of them."""
+    hull: list[int] = []
+    for last in range(places.size):
+        while len(hull) > 1:
+            first, middle = hull[-2:]
+            run, rise = places[last] - places[first], heights[last] - heights[first]
+            if (heights[middle] - heights[first]) * run < rise * (places[middle] - places[first]):
+                break
+            hull.pop()
+        hull.append(last)
+    return np.asarray(np.interp(places, places[hull], heights[hull]))
