@@ -38,8 +38,9 @@ def names_on_demand(package: str) -> Callable[[str], Any]:
     """Return the ``__getattr__`` (PEP 562) of a package.
 
     Its names are those that its ``__init__.py`` imports in ``if TYPE_CHECKING:``, so there is one
-    list of them, which the type checker reads too. None may be called like a module of the
-    package: whoever imported that module first would get it in place of the name.
+    list of them, which the type checker reads too: ``import a as a`` says that a is public. They
+    are its ``__all__`` where it has none. None may be called like a module of the package:
+    whoever imported that module first would get it in place of the name.
 
     Parameters
     ----------
@@ -57,6 +58,8 @@ def names_on_demand(package: str) -> Callable[[str], Any]:
         module = sys.modules[package]
         if not homes:
             homes.update(_homes(Path(str(module.__file__))))
+        if name == "__all__":
+            return sorted(homes)
         if name not in homes:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
         found = getattr(import_module(homes[name]), name)

@@ -13,10 +13,9 @@ import asyncio
 import time
 
 from valve_friction_ros.dashboard import Answer, ServiceRequest
-from valve_friction_ros.dashboard.alarm_list import Asked, request_of
+from valve_friction_ros.dashboard.alarm_list import Asked, HistoryOperator, request_of
 from valve_friction_ros.dashboard.context import GuardedOperator
 from valve_friction_ros.dashboard.history_cache import HistoryCache
-from valve_friction_ros.dashboard.kept_valves import HistoryOperator
 from valve_friction_ros.health import AlarmAction, AlarmKind, Condition, Level, StatusSignal
 from valve_friction_ros.history import (
     AlarmFilter,

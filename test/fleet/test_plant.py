@@ -31,8 +31,9 @@ from local_server import free_port
 
 from valve_friction_ros.commands.main import run
 from valve_friction_ros.dashboard import Plant, ServiceRequest
+from valve_friction_ros.dashboard.alarm_list import HistoryOperator
 from valve_friction_ros.dashboard.context import ValveFiles
-from valve_friction_ros.dashboard.kept_valves import HistoryOperator, KeptValves
+from valve_friction_ros.dashboard.history_cache import KeptValves
 from valve_friction_ros.dashboard.plant_rows import state_of
 from valve_friction_ros.fleet.job import kept_valve
 from valve_friction_ros.fleet.plant import read_plant, tags_in

@@ -17,8 +17,14 @@ from pathlib import Path
 from valve_friction_ros.commands.process import ExitCode, sigterm_raises
 from valve_friction_ros.dashboard import DashboardOptions, Plant
 from valve_friction_ros.dashboard.accounts import Access, accounts_from
-from valve_friction_ros.dashboard.context import INSTALL, DashboardContext, GuardedOperator
-from valve_friction_ros.dashboard.kept_valves import HistoryOperator, KeptValves, NoSignals
+from valve_friction_ros.dashboard.alarm_list import HistoryOperator
+from valve_friction_ros.dashboard.context import (
+    INSTALL,
+    DashboardContext,
+    GuardedOperator,
+    NoSignals,
+)
+from valve_friction_ros.dashboard.history_cache import KeptValves
 from valve_friction_ros.history import HistoryError
 
 REFUSALS = (HistoryError,)

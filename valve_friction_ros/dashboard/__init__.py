@@ -18,38 +18,24 @@ from valve_friction_ros.on_demand import names_on_demand
 
 if TYPE_CHECKING:
     from valve_friction_ros.dashboard.context import (
-        Answer,
-        DashboardOptions,
-        Operator,
-        ServiceRequest,
-        Signals,
-        Visitors,
+        Answer as Answer,
+        DashboardOptions as DashboardOptions,
+        Operator as Operator,
+        ServiceRequest as ServiceRequest,
+        Signals as Signals,
+        Visitors as Visitors,
     )
     from valve_friction_ros.dashboard.live_state import (
-        ESSENTIAL_KEYS,
-        Plant,
-        Status,
-        Unread,
-        ValveView,
-        view_of,
+        ESSENTIAL_KEYS as ESSENTIAL_KEYS,
+        Plant as Plant,
+        Status as Status,
+        Unread as Unread,
+        ValveView as ValveView,
+        view_of as view_of,
     )
-    from valve_friction_ros.dashboard.plant_rows import Selection, selected
+    from valve_friction_ros.dashboard.plant_rows import (
+        Selection as Selection,
+        selected as selected,
+    )
 else:
     __getattr__ = names_on_demand(__name__)
-
-__all__ = [
-    "ESSENTIAL_KEYS",
-    "Answer",
-    "DashboardOptions",
-    "Operator",
-    "Plant",
-    "Selection",
-    "ServiceRequest",
-    "Signals",
-    "Status",
-    "Unread",
-    "ValveView",
-    "Visitors",
-    "selected",
-    "view_of",
-]

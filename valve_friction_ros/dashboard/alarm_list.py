@@ -9,17 +9,18 @@
 
 """Alarms in words: which are listed, their rows, and what may be asked of them."""
 
+import asyncio
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
-from urllib.parse import urlencode
 from zoneinfo import ZoneInfo
 
-from valve_friction_ros.dashboard.context import ServiceRequest
-from valve_friction_ros.dashboard.plant_rows import moment
-from valve_friction_ros.health import AlarmAction, AlarmKind, AlarmState
+from valve_friction_ros.dashboard.context import Answer, Operator, ServiceRequest
+from valve_friction_ros.dashboard.history_cache import HistoryCache
+from valve_friction_ros.dashboard.plant_rows import address_of, moment
+from valve_friction_ros.health import AlarmAction, AlarmError, AlarmKind, AlarmRequest, AlarmState
 from valve_friction_ros.health.alarms import TRANSITIONS
-from valve_friction_ros.history import AlarmFilter, KeptAlarmEvent
+from valve_friction_ros.history import AlarmFilter, HistoryError, KeptAlarmEvent
 from valve_friction_ros.outside_text import printable
 from valve_friction_ros.streams import DAY
 from valve_friction_ros.wording import alarm_advice
@@ -87,12 +88,6 @@ def request_of(asked: Asked, kind: str) -> ServiceRequest:
     return ServiceRequest(name, values, switch)
 
 
-def action_of(request: ServiceRequest) -> AlarmAction | None:
-    """Return what a call of a service asks of an alarm; None where it asks something else."""
-    asked = (request.name, request.switch)
-    return next((action for action, one in _SERVICES.items() if one == asked), None)
-
-
 @dataclass(frozen=True)
 class AlarmSelection:
     """What a page of alarms lists.
@@ -148,8 +143,7 @@ class AlarmSelection:
 
     def address(self, more: Mapping[str, str], path: str = "/alarms") -> str:
         """Return the address of this list, with further parts."""
-        query = urlencode({**self.to_query(), **more})
-        return f"{path}?{query}" if query else path
+        return address_of(path, {**self.to_query(), **more})
 
     def chosen(self, now: int) -> AlarmFilter:
         """Return the filter of the history at a time, ns since 1970."""
@@ -195,3 +189,48 @@ def areas_of(valves: Iterable[str]) -> tuple[str, ...]:
         parts = name.strip("/").split("/")[:-2]
         found |= {"/" + "/".join(parts[: k + 1]) for k in range(len(parts))}
     return tuple(sorted(found))
+
+
+class HistoryOperator:
+    """Answers alarms in the file of the history, which their identifiers follow.
+
+    An identifier that shares its process with many valves offers no services for that.
+
+    Parameters
+    ----------
+    history : HistoryCache
+        The history.
+    services : Operator or None
+        Calls the services of identifiers: for all else, and for the alarms of valves that the file
+        does not keep. None: no identifier is heard.
+    """
+
+    def __init__(self, history: HistoryCache, services: Operator | None = None) -> None:
+        self._history, self._services = history, services
+
+    async def call(self, node: str, request: ServiceRequest) -> Answer:
+        """Make a request on an alarm of a valve, or on all of them; or call another service."""
+        history, called = self._history, (request.name, request.switch)
+        action = next((action for action, one in _SERVICES.items() if one == called), None)
+        kept = next((one for one in history.valves if one.name == node), None)
+        if action is None or kept is None or not history.is_file:
+            if self._services is not None:
+                return await self._services.call(node, request)
+            if action is None:
+                return Answer(False, "no identifier is asked: this dashboard shows a history alone")
+            if kept is None:
+                return Answer(False, f"{node}: the history has no such valve")
+            return Answer(False, "the history is on a server: ask the identifier of the valve")
+        kind, hours = request.values["alarm_kind"], request.values["alarm_hours"]
+        try:
+            asked = AlarmRequest(
+                action,
+                str(request.values["alarm_who"]),
+                str(request.values["alarm_text"]),
+                3600 * float(hours) if isinstance(hours, (int, float)) else 0.0,
+            )
+            of = None if kind == "all" else AlarmKind(kind)
+            alarms = await asyncio.to_thread(history.answer_valve, kept, of, asked)
+        except (AlarmError, HistoryError) as error:
+            return Answer(False, str(error))
+        return Answer(True, "; ".join(map(str, alarms)))

@@ -14,7 +14,7 @@ take for UTC: it knows no other zones.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 from zoneinfo import ZoneInfo
 
@@ -86,26 +86,26 @@ def _line(name: str, data: Sequence[Any], colour: str, **style: Any) -> Options:
     }
 
 
+def _scatter(name: str, data: Sequence[Any], colour: str, **style: Any) -> Options:
+    """Return points, one by one; `style` is the series'."""
+    return {"name": name, "type": "scatter", "data": data, "itemStyle": {"color": colour}, **style}
+
+
 def _plain(value: float | None) -> float | None:
-    """Return a number as JSON can hold it, rounded."""
-    return None if value is None or not math.isfinite(value) else _rounded(value)
-
-
-def _rounded(value: float) -> float:
-    """Return a number with six digits, more than a screen shows."""
-    return float(f"{value:.6g}")
-
-
-def _points(strip: Strip, scale: float) -> list[list[float]]:
-    return [
-        [round(t, 3), _rounded(v * scale)]
-        for t, v in zip(strip.times.tolist(), strip.values.tolist(), strict=True)
-    ]
+    """Return a number as JSON can hold it, with six digits, more than a screen shows."""
+    return None if value is None or not math.isfinite(value) else float(f"{value:.6g}")
 
 
 def live_data(pressure: Strip, stem: Strip) -> list[Options]:
     """Return the series of the live chart: pressure in kPa and stem in mm."""
-    return [{"data": _points(pressure, 1e-3)}, {"data": _points(stem, 1e3)}]
+    return [
+        {"data": [[round(t, 3), float(f"{v * scale:.6g}")] for t, v in _pairs(strip)]}
+        for strip, scale in ((pressure, 1e-3), (stem, 1e3))
+    ]
+
+
+def _pairs(strip: Strip) -> Iterable[tuple[float, float]]:
+    return zip(strip.times.tolist(), strip.values.tolist(), strict=True)
 
 
 def live_chart(span: float) -> Options:
@@ -133,28 +133,22 @@ def live_chart(span: float) -> Options:
 
 def loop_data(loop: Strip) -> list[list[float]]:
     """Return the points of a signature, pressures (Pa) and positions (m), as kPa and mm."""
-    return [
-        [_rounded(p * 1e-3), _rounded(x * 1e3)]
-        for p, x in zip(loop.times.tolist(), loop.values.tolist(), strict=True)
-    ]
-
-
-def _recorded(record: Recording | None) -> list[list[float]]:
-    if record is None:
-        return []
-    step = max(1, len(record) // _MOST_POINTS)
-    return loop_data(Strip(record.drive[::step], record.position[::step]))
+    return [[float(f"{p * 1e-3:.6g}"), float(f"{x * 1e3:.6g}")] for p, x in _pairs(loop)]
 
 
 def loop_chart(record: Recording | None) -> Options:
     """Draw the signature of the baseline's record; that of now is filled in by `loop_data`."""
+    healthy = []
+    if record is not None:
+        step = max(1, len(record) // _MOST_POINTS)
+        healthy = loop_data(Strip(record.drive[::step], record.position[::step]))
     return {
         **_base(),
         "grid": {"left": 58, "right": 18, "top": 34, "bottom": 44},
         "xAxis": _axis("value", "pressure [kPa]", nameGap=26),
         "yAxis": _axis("value", "stem [mm]", nameGap=38),
         "series": [
-            _line("baseline", _recorded(record), _GREY, width=1.4),
+            _line("baseline", healthy, _GREY, width=1.4),
             _line("last minute", [], _ORANGE, width=1.4),
         ],
     }
@@ -195,12 +189,18 @@ def trend_chart(
         bars += [[time, _plain(ends[0])], [time, _plain(ends[1])], [time, None]]
     series.append(_line("95 % interval", bars, _BLUE, width=1.2))
     for verdict, points in estimates.items():
-        if points:
-            series.append(_dots(verdict.value, points, verdict is Verdict.WEAK))
+        edge = {"borderColor": _BLUE, "borderWidth": 1.5}
+        filled = "transparent" if verdict is Verdict.WEAK else _BLUE
+        style = {"itemStyle": {"color": filled, **edge}, "symbolSize": 6, "z": 4}
+        series += [_scatter(verdict.value, points, filled, **style)] * bool(points)
     refused = [[_wall(one.time, zone), 0] for one in entries if one.refusal]
     if refused:
-        series.append(_refusals(refused))
-    series += _event_marks(events, zone)
+        small = {"yAxisIndex": 1, "symbol": "rect", "symbolSize": [2, 12]}
+        series.append(_scatter("refused", refused, _GREY, **small))
+    for label, (actions, symbol, colour) in _EVENTS.items():
+        points = [[_wall(one.time, zone), 0.03] for one in events if one.action in actions]
+        mark = {"yAxisIndex": 1, "symbol": symbol, "symbolSize": 10, "z": 6}
+        series += [_scatter(label, points, colour, **mark)] * bool(points)
     series[0]["markLine"] = _marks(history, zone, now)
     name = "sliding friction [N]" if of == "sliding_friction" else "Coulomb friction F_c [N]"
     return {
@@ -211,16 +211,10 @@ def trend_chart(
         "toolbox": {
             "right": 8,
             "top": 28,
-            "feature": {
-                "dataZoom": {"yAxisIndex": False, "filterMode": "none"},
-                "restore": {},
-            },
+            "feature": {"dataZoom": {"yAxisIndex": False, "filterMode": "none"}, "restore": {}},
         },
         "xAxis": _axis("time", ""),
-        "yAxis": [
-            _axis("value", name),
-            {"type": "value", "min": 0, "max": 1, "show": False},
-        ],
+        "yAxis": [_axis("value", name), {"type": "value", "min": 0, "max": 1, "show": False}],
         "series": series,
     }
 
@@ -250,46 +244,6 @@ _EVENTS = {
 }
 
 
-def _event_marks(events: Sequence[AlarmEvent], zone: ZoneInfo) -> list[Options]:
-    drawn = []
-    for name, (actions, symbol, colour) in _EVENTS.items():
-        points = [[_wall(one.time, zone), 0.03] for one in events if one.action in actions]
-        if points:
-            drawn.append(
-                {"name": name, "type": "scatter", "yAxisIndex": 1, "symbol": symbol,
-                 "symbolSize": 10, "data": points, "itemStyle": {"color": colour}, "z": 6}
-            )  # fmt: skip
-    return drawn
-
-
-def _dots(name: str, points: list[list[Any]], is_hollow: bool) -> Options:
-    style = {
-        "color": "transparent" if is_hollow else _BLUE,
-        "borderColor": _BLUE,
-        "borderWidth": 1.5,
-    }
-    return {
-        "name": name,
-        "type": "scatter",
-        "data": points,
-        "symbolSize": 6,
-        "itemStyle": style,
-        "z": 4,
-    }
-
-
-def _refusals(points: list[list[Any]]) -> Options:
-    return {
-        "name": "refused",
-        "type": "scatter",
-        "yAxisIndex": 1,
-        "symbol": "rect",
-        "symbolSize": [2, 12],
-        "data": points,
-        "itemStyle": {"color": _GREY},
-    }
-
-
 def _level_lines(history: ValveHistory, of: str, zone: ZoneInfo) -> list[Options]:
     """Draw baseline and limits as they were in force, without repetitions."""
     steps: list[tuple[int, float | None, Any]] = []
@@ -310,11 +264,12 @@ def _level_lines(history: ValveHistory, of: str, zone: ZoneInfo) -> list[Options
 
 def _trend_lines(trend: Trend, zone: ZoneInfo) -> list[Options]:
     time = np.linspace(0.0, float(end_of_trend(trend) - trend.begin), 60)
-    middle_line, width = trend.line.at(time), trend.line.half_width(time)
+    line, width = trend.line.at(time), trend.line.half_width(time)
     at = [_wall(trend.begin + round(one), zone) for one in time]
-    low = [[t, _plain(y)] for t, y in zip(at, middle_line - width, strict=True)]
-    band = [[t, _plain(y)] for t, y in zip(at, 2 * width, strict=True)]
-    middle = [[t, _plain(y)] for t, y in zip(at, middle_line, strict=True)]
+    low, band, middle = (
+        [[t, _plain(y)] for t, y in zip(at, heights, strict=True)]
+        for heights in (line - width, 2 * width, line)
+    )
     unseen = {"stack": "band", "stackStrategy": "all", "width": 0}
     drawn = [
         _line("", low, _GREEN, **unseen),
@@ -323,10 +278,8 @@ def _trend_lines(trend: Trend, zone: ZoneInfo) -> list[Options]:
     ]
     if trend.crossing is not None:
         point = [_wall(trend.crossing.time, zone), _plain(trend.crossing.level)]
-        drawn.append(
-            {"name": "limit expected", "type": "scatter", "symbol": "diamond", "symbolSize": 13,
-             "data": [point], "itemStyle": {"color": _GREEN}, "z": 5}
-        )  # fmt: skip
+        style = {"symbol": "diamond", "symbolSize": 13, "z": 5}
+        drawn.append(_scatter("limit expected", [point], _GREEN, **style))
     return drawn
 
 

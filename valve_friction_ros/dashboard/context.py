@@ -10,6 +10,7 @@
 """What the pages draw from: options, valves, their history and files, who is asked, who looks."""
 
 import asyncio
+import contextlib
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -136,6 +137,17 @@ class Signals(Protocol):
     def unwatch(self, node: str) -> None:
         """Say that one looks no more; the last one ends the subscriptions."""
         ...
+
+
+class NoSignals:
+    """Nothing comes of any signal."""
+
+    def watch(self, _node: str) -> LiveStrip:
+        """Return a strip that stays empty."""
+        return LiveStrip(60.0)
+
+    def unwatch(self, _node: str) -> None:
+        """Do nothing."""
 
 
 class Visitors(Protocol):
@@ -292,13 +304,11 @@ class ValveFiles:
         for kind, folder in self.folders.items():
             start = f"alarm_{stem}_" if kind == "alarms" else f"{stem}_"
             name = re.compile(rf"{re.escape(start)}\d{{8}}T\d{{6}}Z")
-            try:
+            with contextlib.suppress(OSError):
                 places = sorted(folder.iterdir(), key=lambda one: one.name, reverse=True)
-            except OSError:
-                continue
-            mine = [p for p in places[:_MOST_LOOKED] if name.match(p.name)]
-            for place in mine[:_MOST_FILES]:
-                found += self._files(kind, folder, place)
+                mine = [p for p in places[:_MOST_LOOKED] if name.match(p.name)]
+                for place in mine[:_MOST_FILES]:
+                    found += self._files(kind, folder, place)
         return sorted(found, key=lambda one: -one.time)[: 2 * _MOST_FILES]
 
     @staticmethod
@@ -309,18 +319,13 @@ class ValveFiles:
         return tuple(sorted(found))
 
     def _files(self, kind: str, folder: Path, place: Path) -> list[OfferedFile]:
+        found = []
         try:
-            inside = [place] if place.is_file() else sorted(place.iterdir())[:20]
-            return [
-                OfferedFile(
-                    kind,
-                    one.relative_to(folder).as_posix(),
-                    printable(one.relative_to(folder).as_posix(), 200),
-                    (about := one.stat()).st_size,
-                    about.st_mtime,
-                )
-                for one in inside
-                if one.suffix.lower() in _ENDINGS and one.is_file()
-            ]
+            for one in [place] if place.is_file() else sorted(place.iterdir())[:20]:
+                if one.suffix.lower() in _ENDINGS and one.is_file():
+                    path, about = one.relative_to(folder).as_posix(), one.stat()
+                    label = printable(path, 200)
+                    found.append(OfferedFile(kind, path, label, about.st_size, about.st_mtime))
         except OSError:
             return []
+        return found

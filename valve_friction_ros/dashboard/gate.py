@@ -127,23 +127,21 @@ class ConnectionLog:
         if self._more is not None:
             self._more[client, why] += 1
             return
-        self._log(f"a connection of {printable(client)} was ended: {why}")
-        self._begin()
+        self._tell(f"a connection of {printable(client)} was ended: {why}")
 
-    def _begin(self) -> None:
+    def _tell(self, line: str) -> None:
+        self._log(line)
         self._more = Counter()
         asyncio.get_running_loop().call_later(_SUMMARY, self._sum_up)
 
     def _sum_up(self) -> None:
         more, self._more = self._more, None
-        if not more:
-            return
-        (client, why), _ = max(more.items(), key=lambda one: one[1])
-        self._log(
-            f"{sum(more.values())} more connections were ended in {_SUMMARY:g} s, most of "
-            f"{printable(client)}: {why}"
-        )
-        self._begin()
+        if more:
+            ((client, why), _), count = more.most_common(1)[0], more.total()
+            self._tell(
+                f"{count} more connections were ended in {_SUMMARY:g} s, most of "
+                f"{printable(client)}: {why}"
+            )
 
 
 class _Bounded(HttpToolsProtocol):
@@ -173,7 +171,6 @@ class _Bounded(HttpToolsProtocol):
             oldest.end(f"more than {MOST_OF_A_CLIENT} were open")
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Give a connection up."""
         self._has_arrived()
         super().connection_lost(exc)
 
@@ -200,13 +197,11 @@ class _Bounded(HttpToolsProtocol):
             self._due = None
 
     def on_message_begin(self) -> None:
-        """Begin a request."""
         self._has_begun = True
         self._await_request()
         super().on_message_begin()
 
     def on_message_complete(self) -> None:
-        """End a request."""
         self._has_arrived()
         super().on_message_complete()
 
@@ -215,11 +210,6 @@ def _host(connection: object) -> str:
     """Return the address of the other side, of a WebSocket's protocol as well."""
     client = getattr(connection, "client", None)
     return client[0] if client else ""
-
-
-def bounded_protocol(log: Callable[[str], None]) -> Callable[..., asyncio.Protocol]:
-    """Return what uvicorn takes as ``http``; `log` takes the lines on ended connections."""
-    return partial(_Bounded, ended=ConnectionLog(log))
 
 
 LOG_IN = "/login"
@@ -331,13 +321,7 @@ class Gate:
         name = fields.get("name", "")
         found = await self._log_in.attempt(name, fields.get("password", ""), address)
         if isinstance(found, Refusal):
-            self._tell_refused(name, address, found)
-            if found.wait > 0:
-                minutes = -(-found.wait // 60)
-                page = self._form(there, f"Too many attempts: try again in {minutes} min.", 429)
-                page.headers["Retry-After"] = str(found.wait)
-                return page
-            return self._form(there, "Wrong name or password.", 401)
+            return self._refused(name, address, there, found.wait)
         self._log(f"{printable(name)} has logged in from {printable(address)}")
         self._sessions.end(token_of(request, self._access))  # of whoever sat there before
         response = RedirectResponse(there, 303, OF_LOG_IN)
@@ -351,14 +335,18 @@ class Gate:
         )
         return response
 
-    def _tell_refused(self, name: str, address: str, refusal: Refusal) -> None:
-        """Log a refused log-in, within a bound: whoever tries may try without end."""
-        if self._lines.wait("") > 0:
-            return
-        self._lines.count("")
-        why = "too many attempts" if refusal.wait > 0 else "wrong name or password"
-        shown = printable(name, _LONGEST_NAME)
-        self._log(f"refused log-in of {shown!r} from {printable(address)}: {why}")
+    def _refused(self, name: str, address: str, there: str, wait: int) -> Response:
+        """Refuse a log-in, and log it within a bound: whoever tries may try without end."""
+        if self._lines.wait("") <= 0:
+            self._lines.count("")
+            why = "too many attempts" if wait > 0 else "wrong name or password"
+            shown = printable(name, _LONGEST_NAME)
+            self._log(f"refused log-in of {shown!r} from {printable(address)}: {why}")
+        if wait <= 0:
+            return self._form(there, "Wrong name or password.", 401)
+        page = self._form(there, f"Too many attempts: try again in {-(-wait // 60)} min.", 429)
+        page.headers["Retry-After"] = str(wait)
+        return page
 
     async def _let_through(self, asked: HTTPConnection, receive: Receive, send: Send) -> None:
         if asked.scope["type"] == "http":
@@ -435,8 +423,7 @@ class Guard:
 
     def name(self) -> str:
         """Return the name of the account whose page this is; empty where there is none."""
-        visitor = self.visitor()
-        return "" if visitor is None else visitor.name
+        return visitor.name if (visitor := self.visitor()) else ""
 
     def may_operate(self) -> bool:
         """Tell whether services of identifiers may be called for this page now."""
@@ -465,20 +452,16 @@ def guard(app: App, access: Access, log: Callable[[str], None]) -> Guard:
         access.accounts, access.session_hours * 3600.0, time.time, access.session_file, log
     )
     build = app.build_middleware_stack
+    # The gate is outside all of the stack, also of what is added later.
+    app.build_middleware_stack = lambda: Gate(build(), access, sessions, log)  # type: ignore[method-assign]
 
-    def build_behind_gate() -> Any:
-        """Build the stack with the gate outside all of it, also of what is added later."""
-        return Gate(build(), access, sessions, log)
+    def is_own(origin: str | None, request: dict[str, Any]) -> bool:
+        return is_own_origin(origin, request.get("HTTP_HOST", ""), access.is_encrypted)
 
-    app.build_middleware_stack = build_behind_gate  # type: ignore[method-assign]
-    core.sio.eio.cors_allowed_origins = partial(_is_own, is_encrypted=access.is_encrypted)
+    core.sio.eio.cors_allowed_origins = is_own
     if access.accounts:
         ui.add_head_html(_WATCH, shared=True)
     return Guard(access, sessions)
-
-
-def _is_own(origin: str | None, request: dict[str, Any], is_encrypted: bool) -> bool:
-    return is_own_origin(origin, request.get("HTTP_HOST", ""), is_encrypted)
 
 
 def server_options(access: Access, log: Callable[[str], None]) -> dict[str, Any]:
@@ -491,7 +474,7 @@ def server_options(access: Access, log: Callable[[str], None]) -> dict[str, Any]
         # Else a header of the request would say its address, by which attempts are counted.
         "proxy_headers": False,
         "server_header": False,
-        "http": bounded_protocol(log),
+        "http": partial(_Bounded, ended=ConnectionLog(log)),
     }
     if access.certificate is not None and access.key is not None:
         options |= {"ssl_certfile": str(access.certificate), "ssl_keyfile": str(access.key)}

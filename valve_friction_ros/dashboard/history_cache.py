@@ -7,29 +7,53 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The history as the pages read it: in a thread, and again only when the file has changed."""
+"""The history as the pages read it: in a thread, and again only when the file has changed.
 
+It can also tell a plant of its valves, where no identifier is heard.
+"""
+
+import json
 import math
 import threading
 import time
 from collections import OrderedDict, defaultdict, deque
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from statistics import fmean, median
 from typing import TYPE_CHECKING, NamedTuple
 
 from valve_friction_ros import history as database
-from valve_friction_ros.health import Alarm, AlarmKind, AlarmRequest
+from valve_friction_ros.dashboard.live_state import Plant, Status, Unread
+from valve_friction_ros.health import (
+    Alarm,
+    AlarmKind,
+    AlarmRequest,
+    Level,
+    StatusSignal,
+    Survey,
+    dead_band,
+    dead_band_half_width,
+)
+from valve_friction_ros.health.diagnosis import survey_of
 from valve_friction_ros.history import (
     AlarmFilter,
     HistoryError,
     HistoryFile,
-    HistoryServer,
     KeptAlarmEvent,
     KeptValve,
     Place,
     ValveHistory,
 )
 from valve_friction_ros.history.place import file_state
+from valve_friction_ros.history.status_values import (
+    alarm_values,
+    baseline_values,
+    exact_time,
+    ratio_values,
+    result_values,
+    trend_values,
+)
+from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.streams import DAY
 
 if TYPE_CHECKING:
@@ -104,6 +128,7 @@ class HistoryCache:
 
     def __init__(self, place: Place | None) -> None:
         self._file = None if place is None else database.History(place)
+        self._path = place if isinstance(place, Path) else None  # None: nothing, or a server
         self._asking: threading.Thread | None = None
         self._asked = -_SERVER_PAUSE
         self._rows: set[int] = set()
@@ -122,21 +147,12 @@ class HistoryCache:
         self.revision = 0
         self.alarm_revision = 0
 
-    def _state(self) -> tuple[object, ...]:
-        """Return what changes when the file does, its journal included."""
-        if self._file is None:
-            return ()
-        path = self._file.place
-        if isinstance(path, HistoryServer):
-            return (time.monotonic(),)
-        return file_state(path)
-
     def refresh(self) -> bool:
         """Read what is new, if the file has changed; return whether it has.
 
         A server is asked, and what it answers is there later.
         """
-        if self._file is None or not isinstance(self._file.place, HistoryServer):
+        if self._file is None or self._path is not None:
             return self._refresh()
         is_asking = self._asking is not None and self._asking.is_alive()
         if not is_asking and time.monotonic() - self._asked >= _SERVER_PAUSE:
@@ -147,12 +163,9 @@ class HistoryCache:
 
     def _refresh(self) -> bool:
         with self._lock:
-            state = self._state()
-            if self._file is None or state == self._seen:
+            if self._file is None or not self._may_be_new():
                 return False
             since = time.time_ns() - _SPARK_DAYS * DAY
-            self._seen = state
-            self._begin_anew_for_another_file()
             try:
                 mark = database.history_mark(self._file)
                 if self._mark is None or mark.alarm_event != self._mark.alarm_event:
@@ -183,14 +196,17 @@ class HistoryCache:
             self.revision += 1
             return True
 
-    def _begin_anew_for_another_file(self) -> None:
-        """Forget what was read where another file stands at the path: its rows count from 1."""
-        if self._file is None or isinstance(self._file.place, HistoryServer):
-            return
-        number = file_state(self._file.place)[0].number
+    def _may_be_new(self) -> bool:
+        """Tell whether there may be new rows; where another file stands now, they count from 1."""
+        if self._path is None:
+            return True
+        if (state := file_state(self._path)) == self._seen:
+            return False
+        self._seen, number = state, state[0].number
         if number and self._number and number != self._number:
             self._begin_anew()
         self._number = number or self._number
+        return True
 
     def _begin_anew(self) -> None:
         self._mark, self._row = None, 0
@@ -214,7 +230,7 @@ class HistoryCache:
     @property
     def is_file(self) -> bool:
         """Whether it is a file, which identifiers of this machine follow."""
-        return self._file is not None and not isinstance(self._file.place, HistoryServer)
+        return self._path is not None
 
     def answer(self, alarms: Sequence[tuple[KeptValve, AlarmKind]], request: AlarmRequest) -> int:
         """Make a request on many alarms in the file; return of how many it was kept.
@@ -234,9 +250,9 @@ class HistoryCache:
         return tuple(one.alarm for one in steps.events)
 
     def _written_file(self) -> HistoryFile:
-        if self._file is None or isinstance(self._file.place, HistoryServer):
+        if self._path is None:
             raise HistoryError("the history is no file of this machine: ask each identifier")
-        return HistoryFile(self._file.place)
+        return HistoryFile(self._path)
 
     def spark(self, node: str) -> Sparkline | None:
         """Return the picture of a valve's ratios, if there are some."""
@@ -251,16 +267,99 @@ class HistoryCache:
             return None
         with self._lock:
             if node not in self._histories:
-                kept = next((one for one in self.valves if one.name == node), None)
-                now = time.time_ns()
-                found = (
-                    ()
-                    if kept is None
-                    else database.valve_histories(
-                        self._file, (kept,), now - _READ_DEPTH, now + _READ_DEPTH
-                    )
-                )
+                kept = tuple(one for one in self.valves if one.name == node)
+                since, until = (time.time_ns() + sign * _READ_DEPTH for sign in (-1, 1))
+                found = database.valve_histories(self._file, kept, since, until)
                 self._histories[node] = found[0] if found else None
                 while len(self._histories) > _MOST_CACHED:
                     self._histories.popitem(last=False)
             return self._histories[node]
+
+
+_FOREVER = 2**63 - 1
+
+
+def _status_of(kept: ValveHistory, alarms: Mapping[AlarmKind, Alarm]) -> Status:
+    """Return what is known of a valve as its identifier would say it.
+
+    The last identification that was no refusal gives the numbers, and the last baseline what they
+    are compared with; an alarm that is told raises the level.
+    """
+    last = kept.entries[-1]
+    found = next((one for one in reversed(kept.entries) if not one.refusal), None)
+    diagnosis = (found or last).diagnosis
+    level, signal, told = diagnosis.level, diagnosis.status_signal, [diagnosis.message]
+    for one in alarms.values():
+        if one.is_told and one.kind is AlarmKind.WHOLE_VALVE:
+            told.append(one.condition.message)
+            if one.condition.level > level:
+                level, signal = one.condition.level, one.condition.status_signal
+    values = {
+        "estimate_valid": str(not last.refusal).lower(),
+        "reason": last.refusal,
+        "NE 107": signal.value,
+    }
+    if last.refusal:
+        told.insert(0, f"the last record was refused: {last.refusal}")
+    if found is not None:
+        built = json.loads(found.settings).get("valve", {})
+        valve = Valve(**{name: value for name, value in built.items() if value is not None})
+        band, half_width = dead_band(found, valve), dead_band_half_width(found, valve)
+        values["estimate_time"] = exact_time(found.time)
+        values |= result_values(found.to_dict(), band, half_width)
+        survey = survey_of(found, valve)
+        if kept.set_baseline is None and survey is not Survey.UNKNOWN:
+            values["survey"] = survey.value
+    baseline = None if kept.set_baseline is None else kept.set_baseline.baseline
+    values |= baseline_values(baseline)
+    values |= ratio_values(diagnosis.ratio)
+    values |= trend_values(kept.trend)
+    values |= alarm_values(alarms)
+    return Status(f"{kept.valve.name}: friction", level, kept.valve.tag, "; ".join(told), values)
+
+
+class KeptValves(HistoryCache):
+    """A history that tells a plant of its valves, as their identifiers would.
+
+    Parameters
+    ----------
+    place : Path or HistoryServer
+        The history.
+    plant : Plant
+        Whom it tells.
+    """
+
+    def __init__(self, place: Place, plant: Plant) -> None:
+        super().__init__(place)
+        self._plant = plant
+        self._history = database.History(place)
+        self._told = (-1, -1)
+
+    def _refresh(self) -> bool:
+        is_new = super()._refresh()
+        state = (self.revision, self.alarm_revision)
+        if state != self._told and self.problem is None:
+            self._told = state
+            try:
+                self._tell()
+            except HistoryError as error:
+                self.problem, self._told = str(error), (-1, -1)
+        return is_new
+
+    def _tell(self) -> None:
+        now = time.monotonic()
+        self._plant.expect(self.valves)
+        for valve in self.valves:
+            try:
+                found = database.valve_histories(self._history, (valve,), 0, _FOREVER)
+                statuses = [
+                    _status_of(one, database.read_alarms(self._history, valve.name))
+                    for one in found
+                ]
+            except (ValueError, TypeError, KeyError) as error:
+                signal = {"NE 107": StatusSignal.CHECK_FUNCTION.value}
+                told = f"not readable: {error}"
+                name = f"{valve.name}: friction"
+                statuses = [Status(name, Level.WARN, valve.tag, told, signal)]
+            for status in statuses:
+                self._plant.hear(Unread(status.name, status._replace), now)

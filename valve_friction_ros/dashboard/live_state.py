@@ -85,7 +85,11 @@ def number(text: str | None) -> float:
         return math.nan
 
 
-def quantity(values: Mapping[str, str], name: str, unit: str) -> Quantity:
+def _text(values: Mapping[str, str], key: str, longest: int = _LONGEST_TEXT) -> str:
+    return printable(values.get(key, ""), longest)
+
+
+def _quantity(values: Mapping[str, str], name: str, unit: str) -> Quantity:
     """Return the number of this name and unit with what else is said of it."""
     bracket = f" [{unit}]" if unit else ""
     return Quantity(
@@ -93,115 +97,61 @@ def quantity(values: Mapping[str, str], name: str, unit: str) -> Quantity:
         number(values.get(name + bracket)),
         number(values.get(f"{name} half width{bracket}")),
         unit,
-        printable(values.get(f"{name} verdict", ""), _LONGEST_TEXT),
-        printable(values.get(f"{name} reason", ""), _LONGEST_TEXT),
+        _text(values, f"{name} verdict"),
+        _text(values, f"{name} reason"),
     )
-
-
-def entries_of(values: Mapping[str, str], keys: Iterable[str]) -> tuple[Entry, ...]:
-    """Return some values as entries, with numbers of four digits."""
-    return tuple(_entry(key, values[key]) for key in keys if values[key])
 
 
 def _entry(key: str, text: str) -> Entry:
     match = _KEY.fullmatch(key)
     name, unit = (match["name"], match["unit"] or "") if match else (key, "")
     value = number(text)
-    shown = (
-        printable(text, _LONGEST_TEXT) if math.isnan(value) and text != "nan" else _rounded(value)
-    )
+    if math.isnan(value):
+        shown = "–" if text == "nan" else printable(text, _LONGEST_TEXT)
+    else:
+        shown = f"{value:.0f}" if abs(value) < 1e9 and value == round(value) else f"{value:.4g}"
     unit = "" if unit in ("date", "time", "1") else unit
     return Entry(printable(name.replace("_", " "), _LONGEST_TEXT), shown, printable(unit, 40))
 
 
-def _rounded(value: float) -> str:
-    if math.isnan(value):
-        return "–"
-    if abs(value) < 1e9 and value == round(value):
-        return f"{value:.0f}"
-    return f"{value:.4g}"
-
-
 _CHANGE = " change"
-_USAGE = (
-    "packing_renewed",
-    "travelled_distance",
-    "reversals",
-    "breakaways",
-    "time_watched",
-    "time_near_seat",
-    "counting_dead_band",
-    "usage",
-)
-_COMMAND = (
-    "command ",
-    "moves",
-    "changes left",
-    "largest ",
-    "smallest ",
-    "moved by ",
-    "stem_command",
-)
 _NORMAL = AlarmState.NORMAL.value
 _ALARMS = tuple(f"alarm {kind}" for kind in ALARM_KINDS)
 _SHOWN = (*_ALARMS, "NE 107", "survey", "estimate_", "reason", "friction_ratio", "friction_drift",
           "limit_expected", "baseline", "dead_band", "travel_histogram", "preparing")  # fmt: skip
-_FIT = ("fit", "rms", "systematic", "method", "derivative", "threshold", "samples", "sigma",
-        "r_squared", "fixed", "warnings", "sliding_speed")  # fmt: skip
-
-
-def groups_of(values: Mapping[str, str], parameters: set[str]) -> dict[str, tuple[Entry, ...]]:
-    """Return the values that no other part of a page shows, by what they are about.
-
-    The groups are ``changes``, ``fit``, ``evidence``, ``usage``, ``command`` and ``counters``;
-    `parameters` are the names of the parameters.
-    """
-    keys: dict[str, list[str]] = {
-        name: [] for name in ("changes", "fit", "evidence", "usage", "command", "counters")
-    }
-    for key in values:
-        if place := _group(key, parameters):
-            keys[place].append(key)
-    found = {name: entries_of(values, some) for name, some in keys.items()}
-    bare = (one._replace(name=one.name.removeprefix("evidence ")) for one in found["evidence"])
-    return {**found, "evidence": tuple(bare), "changes": _with_intervals(found["changes"])}
+_STARTS = {
+    "evidence": ("evidence ",),
+    "usage": ("packing_renewed", "travelled_distance", "reversals", "breakaways", "time_watched",
+              "time_near_seat", "counting_dead_band", "usage"),
+    "command": ("command ", "moves", "changes left", "largest ", "smallest ", "moved by ",
+                "stem_command"),
+    "counters": ("samples_",),
+    "fit": ("fit", "rms", "systematic", "method", "derivative", "threshold", "samples", "sigma",
+            "r_squared", "fixed", "warnings", "sliding_speed"),
+}  # fmt: skip
+"""Beginnings of the keys of each group; the first that fits counts."""
 
 
 def _with_intervals(changes: tuple[Entry, ...]) -> tuple[Entry, ...]:
     """Write each change since the baseline with its interval, in one entry."""
     texts = {one.name: one.text for one in changes}
-    return tuple(
-        Entry(
-            one.name.removesuffix(_CHANGE),
-            f"{one.text} ({texts[f'{one.name} low']} to {texts[f'{one.name} high']})"
-            if {f"{one.name} low", f"{one.name} high"} <= texts.keys()
-            else one.text,
-            one.unit,
-        )
-        for one in changes
-        if not one.name.endswith((" low", " high"))
-    )
+    found = []
+    for name, text, unit in changes:
+        if not name.endswith((" low", " high")):
+            ends = [texts[f"{name} {end}"] for end in ("low", "high") if f"{name} {end}" in texts]
+            between = f" ({' to '.join(ends)})" if len(ends) == 2 else ""
+            found.append(Entry(name.removesuffix(_CHANGE), text + between, unit))
+    return tuple(found)
 
 
-def _group(key: str, parameters: set[str]) -> str:
+def _group(key: str, shown: tuple[str, ...]) -> str:
     """Return the group of a key; empty for one that is shown by itself."""
     if f"{_CHANGE} " in key and not key.startswith("evidence "):
         return "changes"
-    if key.startswith(_SHOWN) or any(key.startswith(name) for name in parameters):
+    if key.startswith(shown):
         return ""
-    for group, starts in (
-        ("evidence", ("evidence ",)),
-        ("usage", _USAGE),
-        ("command", _COMMAND),
-        ("counters", ("samples_",)),
-        ("fit", _FIT),
-    ):
-        if key.startswith(starts):
-            return group
-    return "counters"
-
-
-_NO_DEAD_BAND = Quantity("dead_band", math.nan, unit="%")
+    found = (group for group, starts in _STARTS.items() if key.startswith(starts))
+    return next(found, "counters")
 
 
 class Status(NamedTuple):
@@ -291,9 +241,6 @@ class ValveAlarm(NamedTuple):
         return alarm_advice(self.kind, self.level)
 
 
-_NO_SOURCES = Sources()
-
-
 @dataclass(frozen=True)
 class ValveView:
     """What a dashboard shows of one valve.
@@ -310,8 +257,8 @@ class ValveView:
         The severity by NAMUR NE 107.
     sentence : str
         The diagnosis in words.
-    is_valid, reason : bool, str
-        Whether there is an estimate, and why not.
+    reason : str
+        Why there is no estimate; empty where there is one.
     identified : int or None
         When the estimate was made, ns since 1970 (UTC).
     ratio : Ratio or None
@@ -341,15 +288,14 @@ class ValveView:
     level: Level | None = None
     signal: StatusSignal = StatusSignal.GOOD
     sentence: str = ""
-    is_valid: bool = False
     reason: str = ""
     identified: int | None = None
     ratio: Ratio | None = None
-    dead_band: Quantity = _NO_DEAD_BAND
+    dead_band: Quantity = Quantity("dead_band", math.nan, unit="%")  # noqa: RUF009 - a tuple
     parameters: tuple[Quantity, ...] = ()
     baseline: tuple[Quantity, ...] = ()
     drift: Drift | None = None
-    sources: Sources = _NO_SOURCES
+    sources: Sources = Sources()  # noqa: RUF009 - a tuple
     alarms: tuple[ValveAlarm, ...] = ()
     lacks: tuple[BaselineLack, ...] = ()
     survey: str = ""
@@ -366,7 +312,14 @@ class ValveView:
         The groups are ``changes``, ``fit``, ``evidence``, ``usage``, ``command`` and
         ``counters``.
         """
-        return groups_of(self.values, {one.name for one in self.parameters})
+        shown = (*_SHOWN, *(one.name for one in self.parameters))
+        found: dict[str, list[Entry]] = {name: [] for name in ("changes", *_STARTS)}
+        for key, text in self.values.items():
+            if text and (place := _group(key, shown)):
+                found[place].append(_entry(key, text))
+        bare = (one._replace(name=one.name.removeprefix("evidence ")) for one in found["evidence"])
+        groups = {name: tuple(some) for name, some in found.items()}
+        return groups | {"evidence": tuple(bare), "changes": _with_intervals(groups["changes"])}
 
     def parameter(self, name: str) -> Quantity:
         """Return a parameter, without a value where it is not there."""
@@ -422,22 +375,12 @@ ESSENTIAL_KEYS = (
     "baseline_possible",
     *(f"baseline_lacks {one}" for one in _LACKING),
     *_SOURCES,
-    *(f"alarm {kind}{end}" for kind in ALARM_KINDS for end in ("", " level", " until [time]")),
+    *(f"{name}{end}" for name in _ALARMS for end in ("", " level", " until [time]")),
 )
 """Keys of what tells two views of a valve apart, without their counters and ages."""
 
-Essence = tuple[object, ...]
-"""What tells two views of a valve apart, without their counters and ages."""
-
-
-def essence_of(status: Status) -> Essence:
-    """Return what a view is made from: the parameters are those of the estimate's time."""
-    return (
-        status.level,
-        status.hardware_id,
-        status.message,
-        *map(status.values.get, ESSENTIAL_KEYS),
-    )
+_SIGNALS = {one.value: one for one in StatusSignal}
+_LEVELS = {one.value: one for one in Level}
 
 
 def view_of(node: str, status: Status) -> ValveView:
@@ -446,39 +389,36 @@ def view_of(node: str, status: Status) -> ValveView:
     return ValveView(
         node=node,
         tag=printable(status.hardware_id or node.rpartition("/")[0].strip("/") or node, 80),
-        level=Level(status.level) if status.level in Level._value2member_map_ else None,
-        signal=_signal(values.get("NE 107", "")),
+        level=_LEVELS.get(status.level),
+        signal=_SIGNALS.get(values.get("NE 107", ""), StatusSignal.CHECK_FUNCTION),
         sentence=printable(status.message, _LONGEST_SENTENCE),
-        is_valid=values.get("estimate_valid") == "true",
-        reason=printable(values.get("reason", ""), _LONGEST_SENTENCE),
+        reason=_text(values, "reason", _LONGEST_SENTENCE),
         identified=_stamp(values.get("estimate_time", "")),
         ratio=_ratio(values),
-        dead_band=quantity(values, "dead_band", "%"),
+        dead_band=_quantity(values, "dead_band", "%"),
         parameters=_parameters(values),
         baseline=_baseline(values),
         drift=_drift(values),
         sources=Sources(*(values.get(key, "") for key in _SOURCES)),
         alarms=_alarms(values),
         lacks=_lacks(values),
-        survey=printable(values.get("survey", ""), 20),
+        survey=_text(values, "survey", 20),
         values=values,
     )
 
 
 def _alarms(values: Mapping[str, str]) -> tuple[ValveAlarm, ...]:
-    found = []
-    for kind in ALARM_KINDS:
-        state = values.get(f"alarm {kind}", _NORMAL)
-        if state != _NORMAL:
-            level, until = (
-                values.get(f"alarm {kind} {one}", "") for one in ("level", "until [time]")
-            )
-            message = printable(values.get(f"alarm {kind} message", ""), _LONGEST_SENTENCE)
-            found.append(
-                ValveAlarm(kind, printable(state, 40), printable(level, 10), message,
-                           printable(until, 40))
-            )  # fmt: skip
-    return tuple(found)
+    return tuple(
+        ValveAlarm(
+            kind,
+            _text(values, name, 40),
+            _text(values, f"{name} level", 10),
+            _text(values, f"{name} message", _LONGEST_SENTENCE),
+            _text(values, f"{name} until [time]", 40),
+        )
+        for kind, name in zip(ALARM_KINDS, _ALARMS, strict=True)
+        if values.get(name, _NORMAL) != _NORMAL
+    )
 
 
 def _lacks(values: Mapping[str, str]) -> tuple[BaselineLack, ...]:
@@ -499,13 +439,6 @@ def _lacks(values: Mapping[str, str]) -> tuple[BaselineLack, ...]:
     )
 
 
-def _signal(letter: str) -> StatusSignal:
-    try:
-        return StatusSignal(letter)
-    except ValueError:
-        return StatusSignal.CHECK_FUNCTION
-
-
 def _stamp(text: str) -> int | None:
     try:
         moment = datetime.strptime(text, "%Y-%m-%dT%H:%M:%S.%f%z")
@@ -518,8 +451,7 @@ def _ratio(values: Mapping[str, str]) -> Ratio | None:
     value, low, high = (number(values.get(f"friction_ratio{end}")) for end in ("", " low", " high"))
     if not math.isfinite(value):
         return None
-    of = printable(values.get("friction_ratio of", ""), 80)
-    return Ratio.between(value, low, high, of=of)
+    return Ratio.between(value, low, high, of=_text(values, "friction_ratio of", 80))
 
 
 def _parameters(values: Mapping[str, str]) -> tuple[Quantity, ...]:
@@ -528,7 +460,7 @@ def _parameters(values: Mapping[str, str]) -> tuple[Quantity, ...]:
         name, bracket, unit = key.partition(" half width [")
         if bracket and f"{name} verdict" in values and not name.startswith("evidence "):
             units[name] = unit.rstrip("]")
-    return tuple(quantity(values, name, unit) for name, unit in units.items())
+    return tuple(_quantity(values, name, unit) for name, unit in units.items())
 
 
 def _baseline(values: Mapping[str, str]) -> tuple[Quantity, ...]:
@@ -538,7 +470,7 @@ def _baseline(values: Mapping[str, str]) -> tuple[Quantity, ...]:
         number(values.get("baseline half width [N]")),
         "N",
     )
-    sliding = quantity(values, "baseline_sliding_friction", "N")._replace(name="sliding_friction")
+    sliding = _quantity(values, "baseline_sliding_friction", "N")._replace(name="sliding_friction")
     return tuple(one for one in (coulomb, sliding) if one.is_known)
 
 
@@ -547,12 +479,11 @@ def _drift(values: Mapping[str, str]) -> Drift | None:
     if not math.isfinite(value):
         return None
     expected = None
-    if limit := values.get("limit_expected"):
-        dates = (f"limit_expected{end} [date]" for end in ("", " earliest", " latest"))
-        texts = (printable(values.get(one, ""), 40) for one in dates)
-        expected = Expected(printable(limit, 40), *texts)
+    if values.get("limit_expected"):
+        ends = ("", " [date]", " earliest [date]", " latest [date]")
+        expected = Expected(*(_text(values, f"limit_expected{end}", 40) for end in ends))
     width = number(values.get("friction_drift half width [N/month]"))
-    return Drift(value, width, printable(values.get("friction_drift of", ""), 80), expected)
+    return Drift(value, width, _text(values, "friction_drift of", 80), expected)
 
 
 MOST_VALVES = 5000
@@ -600,7 +531,7 @@ class _Valve:
         self.is_kept = False
         self.view = view
         self._mark: object = None
-        self._essence: Essence = ()
+        self._essence: tuple[object, ...] = ()
         self._read: Unread | None = None
 
     def look(self, node: str, with_values: bool) -> None:
@@ -620,7 +551,8 @@ class _Valve:
             self.latest = None
             return
         self._mark = mark
-        essence = essence_of(status)
+        # The parameters are those of the estimate's time.
+        essence = (*status[1:4], *map(status.values.get, ESSENTIAL_KEYS))
         if essence != self._essence:
             self.view, self._essence = view_of(node, status), essence
             self.revision += 1
@@ -683,6 +615,7 @@ class Plant:
             del self._valves[node]
 
     def _entry(self, node: str, tag: str) -> _Valve | None:
+        """Return a valve, which is added where there is room for it."""
         valve = self._valves.get(node)
         if valve is None and len(self._valves) < MOST_VALVES:
             view = view_of(node, Status("", 3, tag, "", {}))

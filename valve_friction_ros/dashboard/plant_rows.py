@@ -28,6 +28,12 @@ from valve_friction_ros.streams import utc
 from valve_friction_ros.wording import number_and_width, with_width
 
 
+def address_of(path: str, parts: Mapping[str, str]) -> str:
+    """Return the address of a page with the parts that say something."""
+    query = urlencode({key: text for key, text in parts.items() if text})
+    return f"{path}?{query}" if query else path
+
+
 def zone_asked(query: Mapping[str, str], usual: str) -> ZoneInfo:
     """Return the zone that an address asks for by ``tz``; the usual one for an unknown name."""
     try:
@@ -74,44 +80,31 @@ def state_of(valve: Heard) -> str:
     return level.name.lower()
 
 
-def _said_last(valve: Heard) -> int:
-    """Return the level that a silent valve has said last: it orders these."""
-    return (valve.view.level or 0) if state_of(valve) == "silent" else 0
+def _falling(value: float | None) -> float:
+    """Return the key by which the largest number comes first, and a missing one last."""
+    return math.inf if value is None or math.isnan(value) else -value
 
 
-def _change(valve: Heard) -> float:
-    """Return the change of friction: one that has halved has changed as much as one doubled."""
-    ratio = valve.view.ratio
-    return abs(math.log(ratio.value)) if ratio is not None and ratio.value > 0 else -1.0
-
-
-def _or(value: float | None, missing: float = -math.inf) -> float:
-    return missing if value is None or math.isnan(value) else value
-
-
-def worst_first(valve: Heard) -> tuple[Any, ...]:
-    """Return the key by which the valve that needs attention most comes first."""
+def _worst_first(valve: Heard) -> tuple[Any, ...]:
+    state, view = state_of(valve), valve.view
     return (
-        STATES.index(state_of(valve)),
-        -_said_last(valve),
-        -_change(valve),
-        -_or(valve.view.dead_band.if_determined.value),
-        valve.view.tag,
+        STATES.index(state),
+        -(view.level or 0) if state == "silent" else 0,  # what it has said last
+        # A friction that has halved has changed as much as one that has doubled.
+        -abs(math.log(view.ratio.value)) if view.ratio and view.ratio.value > 0 else 1.0,
+        _falling(view.dead_band.if_determined.value),
+        view.tag,
     )
 
 
-def _by_number(value: Callable[[Heard], float | None]) -> Callable[[Heard], tuple[Any, ...]]:
-    return lambda valve: (-_or(value(valve)), valve.view.tag)
-
-
 SORTS: dict[str, Callable[[Heard], tuple[Any, ...]]] = {
-    "worst": worst_first,
-    "tag": lambda valve: (valve.view.tag, valve.view.node),
-    "ratio": _by_number(lambda valve: None if valve.view.ratio is None else valve.view.ratio.value),
-    "dead_band": _by_number(lambda valve: valve.view.dead_band.if_determined.value),
-    "friction": _by_number(lambda valve: valve.view.friction.value),
-    "drift": _by_number(lambda valve: valve.view.drift and abs(valve.view.drift.value)),
-    "age": lambda valve: (valve.view.identified or 0, valve.view.tag),
+    "worst": _worst_first,
+    "tag": lambda one: (one.view.tag, one.view.node),
+    "ratio": lambda one: (_falling(one.view.ratio.value if one.view.ratio else None), one.view.tag),
+    "dead_band": lambda one: (_falling(one.view.dead_band.if_determined.value), one.view.tag),
+    "friction": lambda one: (_falling(one.view.friction.value), one.view.tag),
+    "drift": lambda one: (_falling(one.view.drift and abs(one.view.drift.value)), one.view.tag),
+    "age": lambda one: (one.view.identified or 0, one.view.tag),
 }
 """Orders by name: the key of each puts the most urgent or the largest first."""
 
@@ -178,8 +171,7 @@ class Selection:
 
     def address(self, more: Mapping[str, str]) -> str:
         """Return the address of this page, with further parts."""
-        query = urlencode({**self.to_query(), **more})
-        return f"/?{query}" if query else "/"
+        return address_of("/", {**self.to_query(), **more})
 
     def sorted_by(self, name: str) -> "Selection":
         """Sort by a column; a second time turns it round."""
@@ -248,11 +240,7 @@ def summary(counts: Mapping[str, int]) -> str:
     total = sum(counts.values())
     if not total:
         return "No valve yet"
-    others = [
-        f"{count} {STATE_WORDS[state]}"
-        for state, count in counts.items()
-        if count and state != "ok"
-    ]
+    others = [f"{n} {STATE_WORDS[state]}" for state, n in counts.items() if n and state != "ok"]
     valves = f"{total} valve{'s' if total > 1 else ''}"
     return f"{valves}: {', '.join(others)}" if others else f"{valves}, all good"
 
@@ -293,16 +281,6 @@ def drift_number(drift: Drift) -> str:
     return f"{'+' if drift.value > 0 else ''}{value} {width}".strip()
 
 
-def _drift(view: ValveView) -> Row:
-    if view.drift is None:
-        return {"drift": "–", "expected": ""}
-    expected = view.drift.expected
-    return {
-        "drift": drift_number(view.drift),
-        "expected": f"limit {expected.date}" if expected else "",
-    }
-
-
 def row_of(valve: Heard, spark: Sparkline | None, wall: float, href: str) -> Row:
     """Return the row of a valve; `wall` is the time of day, s since 1970."""
     view = valve.view
@@ -310,6 +288,7 @@ def row_of(valve: Heard, spark: Sparkline | None, wall: float, href: str) -> Row
     friction = view.friction
     value, width = quantity_texts(friction)
     silent = valve.is_silent and valve.silent_for is not None
+    drift = view.drift
     return {
         "i": valve.number,
         "tag": view.tag,
@@ -325,7 +304,8 @@ def row_of(valve: Heard, spark: Sparkline | None, wall: float, href: str) -> Row
         "fc": value,
         "fcw": width,
         "fcof": _FRICTIONS[friction.name] if friction.is_known else "",
-        **_drift(view),
+        "drift": drift_number(drift) if drift else "–",
+        "expected": f"limit {drift.expected.date}" if drift and drift.expected else "",
         "spark": spark.path if spark else "",
         "base": spark.base if spark else "",
         "days": spark.days if spark else 0,
@@ -437,15 +417,12 @@ def side_of_entry(entry: HistoryEntry) -> ComparedIdentification:
     """Return what the history keeps of an identification."""
     units = {**UNITS, SLIDING: "N"}
     parameters = tuple(
-        Quantity(
-            name, one.value, one.half_width, units.get(name, ""), one.verdict.value, one.reason
-        )
-        for name, one in entry.parameters.items()
+        Quantity(name, p.value, p.half_width, units.get(name, ""), p.verdict.value, p.reason)
+        for name, p in entry.parameters.items()
     )
     tag = printable(entry.valve.tag or entry.valve.name, 80)
-    return ComparedIdentification(
-        tag, entry.time, entry.method, printable(entry.diagnosis.message, 2000), parameters
-    )
+    words = printable(entry.diagnosis.message, 2000)
+    return ComparedIdentification(tag, entry.time, entry.method, words, parameters)
 
 
 def compared(one: ComparedIdentification, other: ComparedIdentification) -> tuple[Difference, ...]:
@@ -455,20 +432,13 @@ def compared(one: ComparedIdentification, other: ComparedIdentification) -> tupl
     """
     left = {each.name: each for each in one.parameters}
     right = {each.name: each for each in other.parameters}
-    return tuple(
-        _difference(
-            name,
-            left.get(name, Quantity(name, math.nan)),
-            right.get(name, Quantity(name, math.nan)),
-        )
-        for name in dict.fromkeys((*left, *right))
-    )
-
-
-def _difference(name: str, one: Quantity, other: Quantity) -> Difference:
-    is_open = any(each.verdict in ("fixed", "not identifiable") for each in (one, other))
-    known, value = one.if_determined.value, other.if_determined.value
-    ratio = value / known if known else math.nan
-    shares = [each.half_width / each.value if each.value else math.nan for each in (one, other)]
-    width = math.nan if is_open else abs(ratio) * math.hypot(*shares)
-    return Difference(name, one, other, ratio, width)
+    found = []
+    for name in dict.fromkeys((*left, *right)):
+        both = [side.get(name, Quantity(name, math.nan)) for side in (left, right)]
+        is_open = any(each.verdict in ("fixed", "not identifiable") for each in both)
+        known, value = (each.if_determined.value for each in both)
+        ratio = value / known if known else math.nan
+        shares = [each.half_width / each.value if each.value else math.nan for each in both]
+        width = math.nan if is_open else abs(ratio) * math.hypot(*shares)
+        found.append(Difference(name, both[0], both[1], ratio, width))
+    return tuple(found)

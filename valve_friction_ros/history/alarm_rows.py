@@ -122,10 +122,16 @@ def _newest(*of_valve: Any) -> Any:
     return sa.select(newest).where(*of_valve).group_by(_EVENT.c.valve_id, _EVENT.c.kind)
 
 
-def _alarms(connection: Connection, valve: int) -> dict[AlarmKind, Alarm]:
-    last = sa.select(_EVENT).where(_EVENT.c.id.in_(_newest(_EVENT.c.valve_id == valve)))
-    events = map(_event, connection.execute(last).mappings())
-    return {one.alarm.kind: one.alarm for one in events}
+def _alarms(connection: Connection, valves: Iterable[int]) -> dict[tuple[int, AlarmKind], Alarm]:
+    """Return the alarms of some valves, each given by its row."""
+    newest = _newest(_EVENT.c.valve_id.in_(valves))
+    rows = connection.execute(sa.select(_EVENT).where(_EVENT.c.id.in_(newest))).mappings()
+    found = ((row["valve_id"], _event(row).alarm) for row in rows)
+    return {(valve, alarm.kind): alarm for valve, alarm in found}
+
+
+def _alarms_of(connection: Connection, valve: int) -> dict[AlarmKind, Alarm]:
+    return {kind: alarm for (_, kind), alarm in _alarms(connection, [valve]).items()}
 
 
 class AlarmSteps(NamedTuple):
@@ -143,7 +149,7 @@ def _kept(
 ) -> AlarmSteps:
     with writing(file.path) as connection:
         number = valve_id(connection, valve)
-        alarms = _alarms(connection, number)
+        alarms = _alarms_of(connection, number)
         events = steps(alarms)
         put(connection, _EVENT, [_row(number, one) for one in events], is_kept=True)
         if events and days > 0:
@@ -194,13 +200,10 @@ def request_many(
     """
     with writing(file.path) as connection:
         numbers = {valve: valve_id(connection, valve) for valve in {one for one, _ in asked}}
-        of_valves = _EVENT.c.valve_id.in_(numbers.values())
-        last = sa.select(_EVENT).where(_EVENT.c.id.in_(_newest(of_valves)))
-        rows = connection.execute(last).mappings()
-        alarms = {(row["valve_id"], row["kind"]): _event(row).alarm for row in rows}
+        alarms = _alarms(connection, numbers.values())
         written = []
         for valve, kind in dict.fromkeys(asked):
-            alarm = alarms.get((numbers[valve], kind.value), Alarm(kind))
+            alarm = alarms.get((numbers[valve], kind), Alarm(kind))
             if (alarm.state, request.action) in TRANSITIONS:
                 written.append(_row(numbers[valve], requested(alarm, request, time)))
         put(connection, _EVENT, written, is_kept=True)
@@ -280,7 +283,7 @@ def read_alarms(file: History, valve: str) -> dict[AlarmKind, Alarm]:
     number = sa.select(tables.valve.c.id).where(tables.valve.c.name == valve)
     with reading(file.place) as connection:
         found = connection.scalar(number)
-        return {} if found is None else _alarms(connection, found)
+        return {} if found is None else _alarms_of(connection, found)
 
 
 # Lists
@@ -365,48 +368,32 @@ def standing_alarms(
     return _listed(history, chosen or AlarmFilter(), most, is_last, sa.not_(is_normal))
 
 
-_COLUMNS = (
-    "time",
-    "area",
-    "valve",
-    "tag",
-    "alarm",
-    "event",
-    "state",
-    "level",
-    "ne_107",
-    "raised",
-    "until",
-    "who",
-    "text",
-    "message",
-)
+_CSV: dict[str, Callable[[KeptAlarmEvent], object]] = {
+    "time": lambda one: _iso(one.event.time),
+    "area": lambda one: one.area,
+    "valve": lambda one: one.valve.name,
+    "tag": lambda one: one.valve.tag,
+    "alarm": lambda one: one.event.alarm.kind.value,
+    "event": lambda one: one.event.action.value,
+    "state": lambda one: one.event.alarm.state.value,
+    "level": lambda one: one.event.alarm.condition.level.name,
+    "ne_107": lambda one: one.event.alarm.condition.status_signal.value,
+    "raised": lambda one: _iso(one.event.alarm.raised),
+    "until": lambda one: _iso(one.event.alarm.until),
+    "who": lambda one: one.event.who,
+    "text": lambda one: one.event.text,
+    "message": lambda one: one.event.alarm.message,
+}
+"""What each column of the CSV says of an event."""
 
 
 def alarms_as_csv(events: Iterable[KeptAlarmEvent]) -> str:
     """Write events as CSV, a line each, times after ISO 8601 (UTC)."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(_COLUMNS)
+    writer.writerow(_CSV)
     for one in events:
-        event, alarm = one.event, one.event.alarm
-        row = (
-            _iso(event.time),
-            one.area,
-            one.valve.name,
-            one.valve.tag,
-            alarm.kind.value,
-            event.action.value,
-            alarm.state.value,
-            alarm.condition.level.name,
-            alarm.condition.status_signal.value,
-            _iso(alarm.raised),
-            _iso(alarm.until),
-            event.who,
-            event.text,
-            alarm.message,
-        )
-        writer.writerow(map(harmless, row))
+        writer.writerow(harmless(cell(one)) for cell in _CSV.values())
     return out.getvalue()
 
 

@@ -15,15 +15,17 @@ import re
 import time
 import uuid
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import fields, replace
 from itertools import groupby
-from typing import Any
+from pathlib import Path
+from typing import Any, TypeVar
 
 import numpy as np
 import sqlalchemy as sa
 from sqlalchemy.engine import Connection, RowMapping
 
+from valve_friction_ros.evidence import FrictionChange, Move
 from valve_friction_ros.health.baseline import Baseline, SlidingFriction
 from valve_friction_ros.health.comparison import Ratio
 from valve_friction_ros.health.diagnosis import (
@@ -38,7 +40,14 @@ from valve_friction_ros.health.levels import Level, StatusSignal
 from valve_friction_ros.health.measured import Measured
 from valve_friction_ros.health.valve_changes import DIFFERENCES, RATIOS
 from valve_friction_ros.history import tables
-from valve_friction_ros.history.entry import Fit, HistoryEntry, KeptBaseline, KeptValve, Span
+from valve_friction_ros.history.entry import (
+    AlarmRecording,
+    Fit,
+    HistoryEntry,
+    KeptBaseline,
+    KeptValve,
+    Span,
+)
 from valve_friction_ros.history.tables import joined, put
 from valve_friction_ros.identification import (
     PARAMETER_UNITS,
@@ -51,6 +60,7 @@ from valve_friction_ros.model.drive import Drive
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.streams import DAY
+from valve_friction_ros.usage import Usage
 from valve_friction_ros.wording import Code, Statement, quoted, said, sentence
 
 _SAMPLE = np.dtype("<f4")
@@ -73,6 +83,55 @@ _OF_REPLACED = tuple(f"replaced_{name}" for name in _OF_BASELINE)
 """Columns of a baseline: in its table, in that of the identifications, and as the one before."""
 
 _NUMBERS = {"baseline": tables.baseline_number, "identification": tables.identification_number}
+
+
+T = TypeVar("T")
+
+# A value is a row by the names of its fields; some columns have another name, or there is none.
+
+_COLUMNS: dict[type, dict[str, str | None]] = {
+    AlarmRecording: {"time": "time_ns"},
+    Move: {"begin": "begin_ns", "end": "end_ns"},
+    FrictionChange: {"earliest": "earliest_ns", "latest": "latest_ns"},
+    SlidingFriction: {"value": "sliding_friction"},
+    Usage: {"histogram": "histogram_ns"},
+    Parameter: {"withheld": None, "uncalibrated": None},
+    Ratio: {"value": "ratio", "half_width": None, "low": "ratio_low", "high": "ratio_high",
+            "of": "ratio_of", "speed": "ratio_speed"},
+    FrictionLimits: {"survey": None},
+}  # fmt: skip
+_WRITERS: dict[Any, Callable[[Any], Any]] = {
+    Level: int,
+    Path: str,
+    Verdict: lambda one: one.value,
+    tuple[int, ...]: json.dumps,
+}
+_READERS: dict[Any, Callable[[Any], Any]] = {
+    float: lambda one: math.nan if one is None else float(one),  # SQLite stores nan as NULL
+    tuple[int, ...]: lambda one: tuple(json.loads(one)),
+}
+
+
+def _stored(kind: Any) -> Iterator[tuple[str, str, Any]]:
+    """Yield field, column and type of what is kept of a type."""
+    names = _COLUMNS.get(kind, {})
+    for one in fields(kind):
+        if (column := names.get(one.name, one.name)) is not None:
+            yield one.name, column, one.type
+
+
+def columns_of(one: Any, kind: Any = None) -> dict[str, Any]:
+    """Return the columns of a value, or of one of a `kind` that may be missing, all None then."""
+    return {
+        column: None if one is None else _WRITERS.get(of, lambda value: value)(getattr(one, name))
+        for name, column, of in _stored(kind or type(one))
+    }
+
+
+def value_of(kind: Callable[..., T], row: RowMapping, **more: Any) -> T:
+    """Return the value of a type that is in a row, with `more` of its fields."""
+    found = {name: _READERS.get(of, of)(row[column]) for name, column, of in _stored(kind)}
+    return kind(**found | more)
 
 
 def valve_id(connection: Connection, valve: KeptValve) -> int:
@@ -113,7 +172,6 @@ def insert_entry(connection: Connection, valve: int, entry: HistoryEntry) -> Non
     """Add an identification to a valve. SQLite stores nan as NULL."""
     diagnosis = entry.diagnosis
     begin, end = entry.span or (None, None)
-    ratio = diagnosis.ratio
     row = _insert(
         connection,
         tables.identification,
@@ -131,14 +189,10 @@ def insert_entry(connection: Connection, valve: int, entry: HistoryEntry) -> Non
         level=int(diagnosis.level),
         status_signal=diagnosis.status_signal.value,
         message=diagnosis.message,
-        ratio=None if ratio is None else ratio.value,
-        ratio_low=None if ratio is None else ratio.low,
-        ratio_high=None if ratio is None else ratio.high,
-        ratio_of=None if ratio is None else ratio.of,
-        ratio_speed=None if ratio is None else ratio.speed,
+        **columns_of(diagnosis.ratio, Ratio),
         sliding_speed=entry.sliding_speed,
         **_baseline_columns(entry.baseline, _OF_ENTRY),
-        **entry.limits.ratios,
+        **columns_of(entry.limits),
         **state_columns(diagnosis),
         settings_id=settings_id(connection, entry.settings),
         software_version=entry.version,
@@ -146,14 +200,8 @@ def insert_entry(connection: Connection, valve: int, entry: HistoryEntry) -> Non
     parameters = [
         {
             "identification_id": row,
-            "name": one.name,
-            "value": one.value,
-            "standard_error": one.standard_error,
-            "half_width": one.half_width,
-            "verdict": one.verdict.value,
-            "reason": one.reason,
-            "published": one.published,
             "uncalibrated_half_width": one.uncalibrated and one.uncalibrated.half_width,
+            **columns_of(one),
         }
         for one in entry.parameters.values()
     ]
@@ -311,17 +359,8 @@ _PLACES = {name: place for place, name in enumerate(PARAMETER_UNITS)}
 
 
 def _parameter(row: RowMapping) -> Parameter:
-    shown = Parameter(
-        row["name"],
-        _number(row["value"]),
-        _number(row["standard_error"]),
-        _number(row["half_width"]),
-        Verdict(row["verdict"]),
-        row["reason"],
-        published=_number(row["published"]),
-    )
-    width = row["uncalibrated_half_width"]
-    if width is None:
+    shown = value_of(Parameter, row)
+    if (width := row["uncalibrated_half_width"]) is None:
         return shown
     return replace(shown, uncalibrated=replace(shown, standard_error=math.nan, half_width=width))
 
@@ -331,14 +370,10 @@ def _entry(
 ) -> HistoryEntry:
     ratio = None
     if row["ratio"] is not None:
-        ratio = Ratio.between(
-            row["ratio"],
-            _number(row["ratio_low"]),
-            _number(row["ratio_high"]),
-            of=row["ratio_of"] or "coulomb_friction",
-            speed=_number(row["ratio_speed"]),
-        )
-    limits = FrictionLimits(row["warn_ratio"], row["error_ratio"], row["low_ratio"])
+        low, high = (_number(row[f"ratio_{end}"]) for end in ("low", "high"))
+        of, speed = row["ratio_of"] or "coulomb_friction", _number(row["ratio_speed"])
+        ratio = Ratio.between(row["ratio"], low, high, of=of, speed=speed)
+    limits = value_of(FrictionLimits, row)
     return HistoryEntry(
         time=row["time_ns"],
         valve=KeptValve(row["valve_name"], row["tag"]),

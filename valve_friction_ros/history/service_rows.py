@@ -13,15 +13,11 @@ All functions raise HistoryError if the history cannot be read or written.
 """
 
 import contextlib
-import json
-import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import fields
-from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 import sqlalchemy as sa
-from sqlalchemy.engine import Connection, RowMapping
+from sqlalchemy.engine import Connection
 
 from valve_friction_ros.evidence import MOST_MOVES, FrictionChange, Move
 from valve_friction_ros.health import Reference, SlidingFriction
@@ -32,46 +28,12 @@ from valve_friction_ros.history import tables
 from valve_friction_ros.history.database import reading, writing
 from valve_friction_ros.history.entry import AlarmRecording, KeptValve
 from valve_friction_ros.history.history import History, HistoryFile
-from valve_friction_ros.history.rows import oldest_kept, valve_id
+from valve_friction_ros.history.rows import T, columns_of, oldest_kept, value_of, valve_id
 from valve_friction_ros.history.tables import joined, put
 from valve_friction_ros.history.trend import Trend, ValveHistory, trend_of
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.response import StepAnswer, summarised
 from valve_friction_ros.usage import Usage, UsedDay, ValveUsage, total
-
-_T = TypeVar("_T")
-
-# A value is a row by the names of its fields; some columns have another name.
-
-_COLUMNS: dict[type, dict[str, str]] = {
-    AlarmRecording: {"time": "time_ns"},
-    Move: {"begin": "begin_ns", "end": "end_ns"},
-    FrictionChange: {"earliest": "earliest_ns", "latest": "latest_ns"},
-    SlidingFriction: {"value": "sliding_friction"},
-    Usage: {"histogram": "histogram_ns"},
-}
-_WRITERS: dict[Any, Callable[[Any], Any]] = {Level: int, Path: str, tuple[int, ...]: json.dumps}
-_READERS: dict[Any, Callable[[Any], Any]] = {
-    float: lambda one: math.nan if one is None else float(one),  # SQLite stores nan as NULL
-    tuple[int, ...]: lambda one: tuple(json.loads(one)),
-}
-
-
-def _stored(kind: Any) -> list[tuple[str, str, Any]]:
-    """Return field, column and type of what is kept of a type."""
-    names = _COLUMNS.get(kind, {})
-    return [(one.name, names.get(one.name, one.name), one.type) for one in fields(kind)]
-
-
-def _columns(one: Any) -> dict[str, Any]:
-    return {
-        column: _WRITERS.get(kind, lambda value: value)(getattr(one, name))
-        for name, column, kind in _stored(type(one))
-    }
-
-
-def _value(kind: Callable[..., _T], row: RowMapping) -> _T:
-    return kind(**{n: _READERS.get(of, of)(row[column]) for n, column, of in _stored(kind)})
 
 
 def _of_valve(table: sa.Table, valve: str, *order: Any) -> Any:
@@ -80,9 +42,9 @@ def _of_valve(table: sa.Table, valve: str, *order: Any) -> Any:
     return query.where(tables.valve.c.name == valve).order_by(*order)
 
 
-def _all_of(kind: Callable[..., _T], file: History, query: Any) -> tuple[_T, ...]:
+def _all_of(kind: Callable[..., T], file: History, query: Any) -> tuple[T, ...]:
     with reading(file.place) as connection:
-        return tuple(_value(kind, row) for row in connection.execute(query).mappings())
+        return tuple(value_of(kind, row) for row in connection.execute(query).mappings())
 
 
 class _Rows(NamedTuple):
@@ -126,7 +88,7 @@ def keep_alarm_recording(
     table = tables.alarm_recording
     with _rows_of(file, valve) as rows:
         rows.drop(table, table.c.time_ns == one.time)
-        rows.put(table, _columns(one))
+        rows.put(table, columns_of(one))
         rows.drop_older(table.c.time_ns, one.time, days)
 
 
@@ -171,7 +133,7 @@ def keep_answers(
         return
     table = tables.answer
     with _rows_of(file, valve) as rows:
-        rows.put(table, *({"travel": travel, **_columns(one)} for one in moves))
+        rows.put(table, *({"travel": travel, **columns_of(one)} for one in moves))
         rows.drop_older(table.c.stamp, moves[-1].stamp, days)
         rows.drop_beyond(table.c.id, _MOST_ANSWERS)
 
@@ -185,7 +147,7 @@ def read_answers(file: History, valve: str, travel: float | None = None) -> tupl
         query = _of_valve(tables.answer, valve, tables.answer.c.id)
         rows = connection.execute(query).mappings().all()
         wanted = rows[-1]["travel"] if rows and travel is None else travel
-        return tuple(_value(StepAnswer, row) for row in rows if row["travel"] == wanted)
+        return tuple(value_of(StepAnswer, row) for row in rows if row["travel"] == wanted)
 
 
 # Moves in service, and what they say together
@@ -199,7 +161,7 @@ def _actuator(table: sa.Table, built: Valve) -> Any:
 
 def _with(built: Valve, one: Any) -> dict[str, Any]:
     names = ("diaphragm_area", "pressure_reference")
-    return {**{name: getattr(built, name) for name in names}, **_columns(one)}
+    return {**{name: getattr(built, name) for name in names}, **columns_of(one)}
 
 
 def keep_moves(
@@ -251,7 +213,7 @@ def read_reference(file: History, valve: str, built: Valve) -> Reference | None:
     with reading(file.place) as connection:
         query = _of_valve(table, valve).where(_actuator(table, built))
         row = connection.execute(query).mappings().first()
-        return None if row is None else Reference(_value(SlidingFriction, row), row["time_ns"])
+        return None if row is None else Reference(value_of(SlidingFriction, row), row["time_ns"])
 
 
 def keep_change(file: HistoryFile, valve: KeptValve, built: Valve, change: FrictionChange) -> None:
@@ -290,7 +252,7 @@ def keep_usage(file: HistoryFile, valve: KeptValve, run: str, days: Iterable[Use
 
 def _used(run: str, one: UsedDay) -> dict[str, Any]:
     own = {"renewal_ns": one.renewal, "day": one.day, "run": run}
-    return {**own, "time_watched_ns": one.usage.time_watched, **_columns(one.usage)}
+    return {**own, "time_watched_ns": one.usage.time_watched, **columns_of(one.usage)}
 
 
 def _merge(rows: _Rows, run: str) -> None:
@@ -309,7 +271,7 @@ def _merge(rows: _Rows, run: str) -> None:
         chosen = (another, table.c.renewal_ns == renewal, table.c.day == day)
         found = connection.execute(sa.select(table).where(of_valve, *chosen)).mappings().all()
         with contextlib.suppress(TypeError, ValueError):  # rows that hold no usage: reading says so
-            merged = UsedDay(day, renewal, total(_value(Usage, each) for each in found))
+            merged = UsedDay(day, renewal, total(value_of(Usage, each) for each in found))
             rows.drop(table, *chosen)
             rows.put(table, _used(_EARLIER_RUNS, merged))
 
@@ -334,7 +296,7 @@ def read_usage(file: History, valve: str) -> ValveUsage:
         rows = connection.execute(_of_valve(tables.usage, valve)).mappings().all()
         renewals = connection.execute(_of_valve(tables.packing_renewal, valve))
         renewed = max((row.time_ns for row in renewals), default=0)
-        days = (UsedDay(row["day"], row["renewal_ns"], _value(Usage, row)) for row in rows)
+        days = (UsedDay(row["day"], row["renewal_ns"], value_of(Usage, row)) for row in rows)
         return ValveUsage.of(days, renewed)
 
 

@@ -269,9 +269,6 @@ class _Days(NamedTuple):
     values: NDArray[np.float64]
     errors: NDArray[np.float64]
 
-    def without(self, index: int) -> "_Days":
-        return _Days(*(np.delete(one, index) for one in self))
-
 
 def _days(points: Sequence[DatedNumber]) -> _Days:
     """Combine the points of each day (UTC) to one point: their weighted mean.
@@ -300,7 +297,7 @@ def _robust_line(days: _Days) -> tuple[ScatteredLine, int]:
     for _ in range(int(_MOST_OUTLIERS * days.times.size)):
         residual = np.abs(days.values - line.at(days.times))
         worst = int(np.argmax(residual / np.hypot(days.errors, line.scatter)))
-        rest = days.without(worst)
+        rest = _Days(*(np.delete(one, worst) for one in days))
         others = fit_line(*rest)
         time, error = days.times[worst], np.hypot(days.errors[worst], others.scatter)
         predicted = np.hypot(error, others.half_width(time) / others.quantile)
@@ -311,18 +308,13 @@ def _robust_line(days: _Days) -> tuple[ScatteredLine, int]:
     return line, outliers
 
 
-def _healthy(baseline: Baseline) -> tuple[float, float]:
-    """Friction of the baseline that points are compared with, and half its interval's width, N."""
-    if baseline.sliding is not None:
-        return baseline.sliding.value, baseline.sliding.half_width
-    return baseline.coulomb_friction or math.nan, baseline.half_width
-
-
 def _crossing(
     line: ScatteredLine, begin: int, end: int, baseline: Baseline, limits: FrictionLimits
 ) -> Crossing | None:
     """Return when the next limit is crossed, if that is not too far ahead."""
-    (friction, half_width), span = _healthy(baseline), end - begin
+    friction = friction_of(baseline, trended(baseline)) or math.nan
+    half_width = (baseline.sliding or baseline).half_width
+    span = end - begin
     now = line.at(span)
     rising = ((Limit.WARN, limits.warn_ratio), (Limit.ERROR, limits.error_ratio))
     ahead = (

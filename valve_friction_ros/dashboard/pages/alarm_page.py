@@ -11,7 +11,7 @@
 
 import asyncio
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -32,7 +32,19 @@ from valve_friction_ros.dashboard.alarm_list import (
 )
 from valve_friction_ros.dashboard.context import Answer, DashboardContext
 from valve_friction_ros.dashboard.live_state import ValveAlarm, ValveView
-from valve_friction_ros.dashboard.pages.theme import Frame, chip, element, frame, text
+from valve_friction_ros.dashboard.pages.theme import (
+    AnswerLine,
+    Frame,
+    RowTable,
+    agreed,
+    chip,
+    element,
+    frame,
+    link,
+    redraw,
+    search_field,
+    text,
+)
 from valve_friction_ros.dashboard.plant_rows import moment
 from valve_friction_ros.health import AlarmAction, AlarmError, AlarmKind, AlarmRequest, AlarmState
 from valve_friction_ros.history import HistoryError, KeptAlarmEvent
@@ -41,23 +53,8 @@ from valve_friction_ros.outside_text import printable
 _PERIOD = 1.0
 
 
-class AlarmTable(ui.element, component="alarm_table.js"):
-    """Rows of alarms, or of events; the browser is sent what has changed.
-
-    Parameters
-    ----------
-    may : bool
-        Whether the visitor may answer them.
-    """
-
-    def __init__(self, may: bool) -> None:
-        super().__init__()
-        self._props["initial"] = {"rows": [], "journal": False, "empty": ""}
-        self._props["may"] = may
-
-    def send(self, news: Mapping[str, Any]) -> None:
-        """Show other rows."""
-        self.run_method("update", dict(news))
+class AlarmTable(RowTable, component="alarm_table.js"):
+    """Alarms, or events, as rows."""
 
 
 async def asked_of_person(
@@ -67,41 +64,28 @@ async def asked_of_person(
 
     The name is that of the account, where there is one.
     """
-    with ui.dialog() as dialog, ui.card().classes("vf-dialog"):
-        dialog.props["aria-label"] = title
-        ui.label(title).classes("vf-dialog-title")
-        action = ui.select(
-            {one.name: ACTIONS[one] for one in actions},
-            value=(chosen or actions[0]).name,
-            label="Action",
-        ).classes("vf-select")
-        hours = ui.number("For hours", value=8.0, min=0.1, max=8784, step=1).classes("vf-select")
-        who = ui.input("Your name", value=name).classes("vf-select")
+    made: list[Any] = []
+
+    def draw() -> None:
+        names = {one.name: ACTIONS[one] for one in actions}
+        action = ui.select(names, value=(chosen or actions[0]).name, label="Action")
+        hours = ui.number("For hours", value=8.0, min=0.1, max=8784, step=1)
+        who = ui.input("Your name", value=name)
         who.set_enabled(not name)
-        words = ui.input("Words for the record").classes("vf-select")
+        made.extend((action, who, ui.input("Words for the record"), hours))
+        for one in made:
+            one.classes("vf-select")
 
         def show() -> None:
             hours.set_visibility(AlarmAction[str(action.value)] in LASTING)
 
         action.on_value_change(show)
         show()
-        with element("div", "vf-actions"):
-            ui.button("Cancel", on_click=lambda: dialog.submit(False), color=None).props(
-                "flat no-caps"
-            )
-            ui.button("Confirm", on_click=lambda: dialog.submit(True), color=None).props(
-                "unelevated no-caps"
-            ).classes("vf-act-first")
-    agreed = bool(await dialog)
-    found = Asked(
-        AlarmAction[str(action.value)],
-        str(who.value or ""),
-        str(words.value or ""),
-        float(hours.value or 0.0),
-    )
-    if not dialog.is_deleted:  # the visitor may have gone meanwhile
-        dialog.delete()
-    return found if agreed else None
+
+    if not await agreed(title, title, draw, ("Cancel", "Confirm"), "flat no-caps"):
+        return None
+    action, who, words, hours = (one.value for one in made)
+    return Asked(AlarmAction[str(action)], str(who or ""), str(words or ""), float(hours or 0.0))
 
 
 class _AlarmPage:
@@ -121,62 +105,44 @@ class _AlarmPage:
         may, one = self._context.visitors.may_operate(), self._selection
         with element("section", "vf-head", aria_label="Filters"):
             self._title = text("h1", "Alarms", "vf-title")
-            with element("div", "vf-search"):
-                search = ui.input(
-                    placeholder="Search tag, sentence, person",
-                    value=one.search,
-                    on_change=lambda event: self._select(search=str(event.value or "")),
-                ).props("dense outlined clearable debounce=250 type=search")
-                search.props["aria-label"] = "Search"
-            self._choice(
-                "List",
-                {False: "alarms that stand", True: "all events"},
-                one.is_journal,
-                lambda value: self._select(is_journal=bool(value)),
-            )
+            search_field("Search tag, sentence, person", one.search, self._select)
+            lists = {False: "alarms that stand", True: "all events"}
+            self._choice("List", lists, "is_journal")
             spans = {name: f"last {name}" for name in RANGES} | {ALL: "all time"}
-            self._choice("Time", spans, one.span, lambda value: self._select(span=str(value)))
+            self._choice("Time", spans, "span")
             areas = areas_of(kept.name for kept in self._context.history.valves)
             names = {area: "all areas" if area == "/" else area for area in (*areas, one.area)}
-            self._choice("Area", names, one.area, lambda value: self._select(area=str(value)))
-            self._several("State", {s: s.value for s in AlarmState}, one.states, "states")
-            self._several("Alarm", {k: k.words for k in AlarmKind}, one.kinds, "kinds")
-            self._export = element("a", "vf-link", href=self._csv(), download="alarms.csv")
-            with self._export:
-                ui.label("CSV")
+            self._choice("Area", names, "area")
+            self._several("State", {s: s.value for s in AlarmState}, "states")
+            self._several("Alarm", {k: k.words for k in AlarmKind}, "kinds")
+            self._export = link("CSV", self._csv(), "vf-link", download="alarms.csv")
             if may:
                 self._all = ui.button("Acknowledge all", on_click=self._acknowledge_all, color=None)
                 self._all.props("no-caps unelevated dense").classes("vf-act vf-act-first")
-        self._says = ui.label("").classes("vf-answer")
-        self._says.props["role"] = "status"
-        self._says.set_visibility(False)
-        self._table = AlarmTable(may)
+        self._answer = AnswerLine()
+        self._table = AlarmTable({"rows": [], "journal": False, "empty": ""}, may=may)
         self._table.on("ask", lambda event: self._ask(event.args))
         self._note = ui.label("").classes("vf-note")
         ui.timer(_PERIOD, self._tick)
 
-    def _choice(
-        self,
-        title: str,
-        names: Mapping[Any, str],
-        value: object,
-        choose: Callable[[object], None],
-    ) -> None:
-        made = ui.select(dict(names), value=value)
-        made.on_value_change(lambda event: choose(event.value))
-        made.classes("vf-pick").props("dense outlined options-dense")
-        made.props["aria-label"] = title
+    def _choice(self, title: str, names: Mapping[Any, str], what: str) -> None:
+        made = ui.select(dict(names), value=getattr(self._selection, what))
+        made.on_value_change(lambda event: self._select(**{what: event.value}))
+        self._dress(made, title)
 
-    def _several(
-        self, title: str, names: Mapping[Any, str], value: frozenset[Any], what: str
-    ) -> None:
+    def _several(self, title: str, names: Mapping[Any, str], what: str) -> None:
         """Draw a choice of several; none: all."""
         texts = {one.name: words for one, words in names.items()}
         by_name = {one.name: one for one in names}
-        made = ui.select(texts, value=[one.name for one in value], label=title, multiple=True)
+        value = [one.name for one in getattr(self._selection, what)]
+        made = ui.select(texts, value=value, label=title, multiple=True)
         made.on_value_change(
             lambda event: self._select(**{what: frozenset(map(by_name.__getitem__, event.value))})
         )
+        self._dress(made, title)
+
+    @staticmethod
+    def _dress(made: ui.select, title: str) -> None:
         made.classes("vf-pick").props("dense outlined options-dense")
         made.props["aria-label"] = title
 
@@ -207,9 +173,11 @@ class _AlarmPage:
         except HistoryError as error:
             problem = str(error)
         self._shown, self._events = state, events[:MOST_ROWS]
-        link = self._page.link
+        address = self._page.link
         rows = [
-            row_of(k, each, self._page.zone, link("/valve", node=each.valve.name), one.is_journal)
+            row_of(
+                k, each, self._page.zone, address("/valve", node=each.valve.name), one.is_journal
+            )
             for k, each in enumerate(self._events)
         ]
         empty = "No alarm meets the filters." if one.to_query() else "No alarm stands."
@@ -254,16 +222,16 @@ class _AlarmPage:
         try:
             request = AlarmRequest(found.action, found.who, found.text)
         except AlarmError as error:
-            self._say("error", str(error))
+            self._answer.say("error", str(error))
             return
         alarms = [(one.valve, one.event.alarm.kind) for one in some]
         answer = await self._context.answer_alarms(alarms, request)
-        self._say("ok" if answer.success else "error", printable(answer.message, 500))
+        self._answer.tell(*answer)
 
     async def _call(self, alarms: Sequence[tuple[str, str]], asked: Asked) -> None:
         """Make a request for each alarm; those of several valves at once, of one in turn."""
         self._is_busy = True
-        self._say("busy", f"{ACTIONS[asked.action]} …")
+        self._answer.say("busy", f"{ACTIONS[asked.action]} …")
         by_valve: dict[str, list[str]] = {}
         for node, kind in alarms:
             by_valve.setdefault(node, []).append(kind)
@@ -275,21 +243,13 @@ class _AlarmPage:
         found = await asyncio.gather(*(of_valve(*each) for each in by_valve.items()))
         answers = [answer for some in found for answer in some]
         self._is_busy = False
-        wrong = [one.message for one in answers if not one.success]
-        if wrong:
-            self._say(
-                "error", f"{len(wrong)} of {len(answers)} refused: {printable(wrong[0], 500)}"
-            )
+        if wrong := [printable(one.message, 500) for one in answers if not one.success]:
+            self._answer.say("error", f"{len(wrong)} of {len(answers)} refused: {wrong[0]}")
         elif len(answers) == 1:
-            self._say("ok", printable(answers[0].message, 500))
+            self._answer.tell(*answers[0])
         else:
-            self._say("ok", f"{len(answers)} done")
+            self._answer.say("ok", f"{len(answers)} done")
         self._shown = ()
-
-    def _say(self, state: str, words: str) -> None:
-        self._says.classes(replace=f"vf-answer vf-answer-{state}")
-        self._says.set_visibility(True)
-        self._says.set_text(words)
 
 
 class AlarmStates:
@@ -310,9 +270,7 @@ class AlarmStates:
     def draw(self) -> None:
         """Draw it, still without alarms."""
         self._body = element("div")
-        self._says = ui.label("").classes("vf-answer")
-        self._says.props["role"] = "status"
-        self._says.set_visibility(False)
+        self._answer = AnswerLine()
         if self._context.visitors.may_operate():
             with element("div", "vf-actions", role="group", aria_label="Alarms of this valve"):
                 for action in (AlarmAction.TAKE_OUT, AlarmAction.PUT_BACK):
@@ -327,13 +285,13 @@ class AlarmStates:
         if view.alarms == self._alarms:
             return
         self._alarms = view.alarms
-        self._body.clear()
-        with self._body:
-            if not view.alarms:
-                text("p", "No alarm stands.", "vf-none")
-                return
-            for one in view.alarms:
-                self._draw_alarm(one)
+        redraw(self._body, lambda: self._draw_alarms(view.alarms))
+
+    def _draw_alarms(self, alarms: Sequence[ValveAlarm]) -> None:
+        if not alarms:
+            text("p", "No alarm stands.", "vf-none")
+        for one in alarms:
+            self._draw_alarm(one)
 
     def _draw_alarm(self, one: ValveAlarm) -> None:
         css = one.level.lower() if one.is_told else "unknown"
@@ -361,9 +319,7 @@ class AlarmStates:
             return
         request = request_of(found, "all" if one is None else one.kind)
         answer = await self._context.operator.call(self._node, request)
-        self._says.classes(replace=f"vf-answer vf-answer-{'ok' if answer.success else 'error'}")
-        self._says.set_visibility(True)
-        self._says.set_text(printable(answer.message, 500))
+        self._answer.tell(*answer)
 
 
 def alarm_page(context: DashboardContext, query: dict[str, str]) -> None:

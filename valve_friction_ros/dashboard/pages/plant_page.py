@@ -13,13 +13,23 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
-from urllib.parse import urlencode
 
 from nicegui import run, ui
 
 from valve_friction_ros.dashboard.context import DashboardContext
-from valve_friction_ros.dashboard.live_state import Heard
-from valve_friction_ros.dashboard.pages.theme import Frame, PlantTable, chip, element, frame, text
+from valve_friction_ros.dashboard.live_state import Heard, Quantity
+from valve_friction_ros.dashboard.pages.theme import (
+    Frame,
+    RowTable,
+    chip,
+    element,
+    frame,
+    redraw,
+    search_field,
+    table_head,
+    table_row,
+    text,
+)
 from valve_friction_ros.dashboard.plant_rows import (
     SIGNAL_WORDS,
     SIGNALS,
@@ -28,6 +38,7 @@ from valve_friction_ros.dashboard.plant_rows import (
     ComparedIdentification,
     RowFeed,
     Selection,
+    address_of,
     compared,
     levels_in,
     moment,
@@ -70,6 +81,10 @@ _NONE_YET = {
 }
 
 
+class PlantTable(RowTable, component="plant_table.js"):
+    """The valves as rows or tiles."""
+
+
 class _PlantPage:
     """What one browser looks at: its selection, and what it has been sent."""
 
@@ -89,13 +104,8 @@ class _PlantPage:
             text("h1", "Plant", "vf-unseen")
             self._title = ui.label("").classes("vf-title")
             self._title.props["role"] = "status"
-            with element("div", "vf-search"):
-                search = ui.input(
-                    placeholder="Search tag, name, diagnosis   ( / )",
-                    value=self._selection.search,
-                    on_change=lambda event: self._select(search=str(event.value or "")),
-                ).props("dense outlined clearable debounce=250 type=search")
-                search.props["aria-label"] = "Search"
+            words = "Search tag, name, diagnosis   ( / )"
+            search_field(words, self._selection.search, self._select)
             with element("div", "vf-filters", role="group", aria_label="State"):
                 for state in STATES if self._context.is_live else _KEPT_STATES:
                     self._chip("states", state, STATE_WORDS[state], f"vf-{state}")
@@ -111,7 +121,7 @@ class _PlantPage:
         first = self._feed.news(shown, spark, time.time(), _FIRST_ROWS)
         live = self._context.is_live
         columns = [one for one in _COLUMNS if live or one["key"] != "heard"]
-        self._table = PlantTable({**first, **self._arrangement(), "live": live}, columns)
+        self._table = PlantTable({**first, **self._arrangement(), "live": live}, columns=columns)
         self._table.on("sort", lambda event: self._sort(event.args))
         self._note = ui.label("").classes("vf-note")
         self._count(heard)
@@ -214,20 +224,17 @@ _MOST_CHOICES = 400
 class _ComparePage:
     """What one browser compares."""
 
-    def __init__(self, context: DashboardContext, query: dict[str, str], page: Frame) -> None:
-        self._context, self._page = context, page
+    def __init__(self, context: DashboardContext, query: dict[str, str]) -> None:
+        self._context = context
         self._nodes = {side: query.get(side, "") for side in _SIDES}
         self._stamps = {"a": query.get("at", _NOW), "b": query.get("bt", _NOW)}
 
     def address(self, common: dict[str, str]) -> str:
-        """Return the address of what is compared."""
-        parts = {**self._nodes, "at": self._stamps["a"], "bt": self._stamps["b"]}
-        kept = {key: value for key, value in parts.items() if value and value != _NOW}
-        query = urlencode({**kept, **common})
-        return f"/compare?{query}" if query else "/compare"
+        stamps = {f"{side}t": one for side, one in self._stamps.items() if one != _NOW}
+        return address_of("/compare", {**self._nodes, **stamps, **common})
 
-    async def draw(self) -> None:
-        """Draw both choices and the table."""
+    async def draw(self, page: Frame) -> None:
+        self._page = page
         self._context.plant.expect(self._context.history.valves)
         valves = sorted(
             (one.view.tag, one.view.node) for one in self._context.plant.valves(time.monotonic())
@@ -270,13 +277,13 @@ class _ComparePage:
             text("h2", f"Side {side.upper()}")
             valve = ui.select(names, value=chosen, label="Valve", with_input=True)
             valve.on_value_change(lambda event: self._choose(side, str(event.value or ""), _NOW))
-            valve.classes("vf-select").props["aria-label"] = f"Valve of side {side.upper()}"
             stamp = self._stamps[side] if self._stamps[side] in times else _NOW
             when = ui.select(times, value=stamp, label="Identification")
             when.on_value_change(
                 lambda event: self._choose(side, self._nodes[side], str(event.value))
             )
-            when.classes("vf-select").props["aria-label"] = f"Identification of side {side.upper()}"
+            for made, name in ((valve, "Valve"), (when, "Identification")):
+                made.classes("vf-select").props["aria-label"] = f"{name} of side {side.upper()}"
 
     def _choose(self, side: str, node: str, stamp: str) -> None:
         self._nodes[side], self._stamps[side] = node, stamp
@@ -301,19 +308,17 @@ class _ComparePage:
     async def _show(self) -> None:
         self._drawn = self._heard_now()
         sides = [await self._side(side) for side in _SIDES]
-        self._body.clear()
-        with self._body:
-            if sides[0] is None or sides[1] is None:
-                text("p", "Choose a valve on both sides.", "vf-none")
-                return
-            self._draw_table(sides[0], sides[1])
+        redraw(self._body, lambda: self._draw_table(*sides))
 
-    def _draw_table(self, one: ComparedIdentification, other: ComparedIdentification) -> None:
+    def _draw_table(
+        self, one: ComparedIdentification | None, other: ComparedIdentification | None
+    ) -> None:
+        if one is None or other is None:
+            text("p", "Choose a valve on both sides.", "vf-none")
+            return
         with element("table", "vf-list vf-compared"):
-            with element("thead"), element("tr"):
-                for title, css in (("number", ""), ("A", "vf-n"), ("B", "vf-n"),
-                                   ("B ÷ A", "vf-n"), ("verdict", "")):  # fmt: skip
-                    text("th", title, css).props["scope"] = "col"
+            sides = ("A", "B", "B ÷ A")
+            table_head(("number", ""), *((side, "vf-n") for side in sides), ("verdict", ""))
             with element("tbody"):
                 heard = tuple(
                     "–" if now is None else ("silent" if now[1] else "now") for now in self._drawn
@@ -324,37 +329,26 @@ class _ComparePage:
                     ("identified", tuple(moment(s.time, self._page.zone) for s in (one, other))),
                     ("method", (one.method, other.method)),
                 ):
-                    with element("tr"):
-                        for each in (name, *words, "", ""):
-                            text("td", each, "" if each == name else "vf-n")
+                    table_row(*((w, "" if w == name else "vf-n") for w in (name, *words, "", "")))
                 for row in compared(one, other):
-                    with element("tr"):
-                        text("td", row.name.replace("_", " "))
-                        for quantity in (row.one, row.other):
-                            value, width = quantity_texts(quantity)
-                            unit = quantity.unit if quantity.if_determined.is_known else ""
-                            text("td", f"{value} {width} {unit}".strip(), "vf-n")
-                        text("td", row.ratio_words, "vf-n")
-                        with element("td"):
-                            if row.verdict:
-                                state = "warn" if row.verdict == "differs" else "unknown"
-                                chip(state, row.verdict)
-                with element("tr"):
-                    text("td", "diagnosis")
-                    for side in (one, other):
-                        text("td", side.sentence, "vf-words vf-said")
-                    text("td", "")
-                    text("td", "")
+                    numbers = (*map(_side_words, (row.one, row.other)), row.ratio_words)
+                    name = row.name.replace("_", " ")
+                    cells = ((name, ""), *((each, "vf-n") for each in numbers))
+                    with table_row(*cells), element("td"):
+                        if row.verdict:
+                            state = "warn" if row.verdict == "differs" else "unknown"
+                            chip(state, row.verdict)
+                said = ((side.sentence, "vf-words vf-said") for side in (one, other))
+                table_row(("diagnosis", ""), *said, ("", ""), ("", ""))
+
+
+def _side_words(one: Quantity) -> str:
+    unit = one.unit if one.if_determined.is_known else ""
+    return " ".join((*quantity_texts(one), unit)).strip()
 
 
 async def compare_page(context: DashboardContext, query: dict[str, str]) -> None:
     """Draw the page; the address names two valves and the times of their identifications."""
-    made: list[_ComparePage] = []
-    with frame(
-        context,
-        query,
-        "Compare · valve friction",
-        lambda common: made[0].address(common) if made else "/compare",
-    ) as inside:
-        made.append(_ComparePage(context, query, inside))
-        await made[0].draw()
+    page = _ComparePage(context, query)
+    with frame(context, query, "Compare · valve friction", page.address) as inside:
+        await page.draw(inside)

@@ -71,7 +71,6 @@ class _Resting:
         self._application, self._is_active = application, is_active
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answer a request."""
         if scope["type"] == "lifespan" or self._is_active():
             await self._application(scope, receive, send)
         elif scope["type"] == "websocket":

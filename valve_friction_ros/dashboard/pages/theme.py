@@ -14,34 +14,33 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-from urllib.parse import urlencode
 from zoneinfo import ZoneInfo
 
 from nicegui import ui
 
 from valve_friction_ros.dashboard.context import DashboardContext
 from valve_friction_ros.dashboard.live_state import Entry
-from valve_friction_ros.dashboard.plant_rows import zone_asked
+from valve_friction_ros.dashboard.plant_rows import address_of, zone_asked
+from valve_friction_ros.outside_text import printable
 
 
-class PlantTable(ui.element, component="plant_table.js"):
-    """Rows or tiles; the browser keeps them, and is sent what has changed.
+class RowTable(ui.element):
+    """Rows that the browser keeps; it is sent what has changed.
 
     Parameters
     ----------
     initial : mapping
-        All rows and the order.
-    columns : list of dict
-        Columns of the table: key, title, unit, sort and css of each.
+        What it shows at first.
+    **props : object
+        What else its component in the browser takes, by name.
     """
 
-    def __init__(self, initial: Mapping[str, Any], columns: list[dict[str, str]]) -> None:
+    def __init__(self, initial: Mapping[str, Any], **props: Any) -> None:
         super().__init__()
-        self._props["initial"] = dict(initial)
-        self._props["columns"] = columns
+        self._props.update({"initial": dict(initial), **props})
 
     def send(self, news: Mapping[str, Any]) -> None:
-        """Send what has changed: ``now``, and at will ``rows``, ``order`` and the view."""
+        """Send what has changed, under the names that `initial` has."""
         self.run_method("update", dict(news))
 
 
@@ -95,8 +94,7 @@ class Frame:
 
     def link(self, path: str, **parts: str) -> str:
         """Return the address of a page, in the same zone and theme."""
-        query = urlencode({key: text for key, text in {**parts, **self.common}.items() if text})
-        return f"{path}?{query}" if query else path
+        return address_of(path, {**parts, **self.common})
 
 
 @contextmanager
@@ -116,64 +114,44 @@ def frame(
     if around is not None:
         around.parent.tag = "div"  # q-page would be a second `main`, with the bar in it
     address = AddressBar()
-    _link("Skip to the content", "#content").classes("vf-skip")
+    link("Skip to the content", "#content").classes("vf-skip")
     with element("header", "vf-bar-top"):
         with element("nav", "vf-nav", aria_label="Pages"):
             element("span", "vf-mark", aria_hidden="true")
-            for text, path in _PAGES:
-                is_here = here({}).partition("?")[0] == path
-                made = _link(text, f"{path}?{urlencode(common)}" if common else path)
-                if is_here:
+            for page, path in _PAGES:
+                made = link(page, address_of(path, common))
+                if here({}).partition("?")[0] == path:
                     made.props["aria-current"] = "page"
         with element("div", "vf-bar-right"):
             clock = ui.label("").classes("vf-clock")
             clock.props["aria-label"] = "time of day"
-            _choice("Time zone", _zones(context, zone), zone.key, "tz", common, here)
-            _choice("Theme", tuple(_THEMES), theme, "theme", common, here)
-            _account(context)
+            zones = ("UTC", context.options.time_zone, zone.key, *_OFTEN)
+            _choice("Time zone", dict.fromkeys(zones), zone.key, "tz", common, here)
+            _choice("Theme", _THEMES, theme, "theme", common, here)
+            if name := context.visitors.name():
+                ui.label(name).classes("vf-account").props["aria-label"] = "logged in"
+                out = ui.button("Log out", on_click=context.visitors.log_out, color=None)
+                out.props("flat no-caps dense")
     with element("main", "vf-main", id="content", tabindex="-1"):
         yield Frame(zone, common, address, clock)
-
-
-def _zones(context: DashboardContext, zone: ZoneInfo) -> tuple[str, ...]:
-    return tuple(dict.fromkeys(("UTC", context.options.time_zone, zone.key, *_OFTEN)))
 
 
 _OFTEN = ("Europe/London", "Europe/Berlin", "America/New_York", "America/Chicago",
           "Asia/Kolkata", "Asia/Shanghai", "Asia/Tokyo", "Australia/Sydney")  # fmt: skip
 
 
-def _account(context: DashboardContext) -> None:
-    """Show who has logged in, and a button to log out."""
-    name = context.visitors.name()
-    if name:
-        ui.label(name).classes("vf-account").props["aria-label"] = "logged in"
-        out = ui.button("Log out", on_click=context.visitors.log_out, color=None)
-        out.props("flat no-caps dense")
-
-
-def _link(text: str, href: str) -> ui.element:
-    with element("a", "", href=href) as made:
-        ui.label(text)
-    return made
-
-
 def _choice(
     title: str,
-    choices: tuple[str, ...],
+    choices: Iterable[str],
     chosen: str,
     key: str,
     common: dict[str, str],
     here: Callable[[dict[str, str]], str],
 ) -> None:
     """Draw a choice that loads the page anew, with its part of the address changed."""
-
-    def choose(event: Any) -> None:
-        text = str(event.value)
-        ui.navigate.to(here({**common, key: text}))
-
-    made = ui.select(list(choices), value=chosen if chosen in choices else choices[0])
-    made.on_value_change(choose)
+    several = [*choices]
+    made = ui.select(several, value=chosen if chosen in several else several[0])
+    made.on_value_change(lambda event: ui.navigate.to(here({**common, key: str(event.value)})))
     made.classes("vf-choice").props("dense borderless options-dense")
     made.props["aria-label"] = title
 
@@ -187,6 +165,32 @@ def text(tag: str, words: str, css: str = "") -> ui.element:
     with element(tag, css) as made:
         ui.label(words)
     return made
+
+
+def link(words: str, href: str, css: str = "", **attributes: str) -> ui.element:
+    """Make a link."""
+    made = text("a", words, css)
+    for name, value in {"href": href, **attributes}.items():
+        made.props[name] = value
+    return made
+
+
+def search_field(words: str, searched: str, select: Callable[..., None]) -> None:
+    """Draw the field of a search; what is written there is selected as ``search``."""
+    with element("div", "vf-search"):
+        made = ui.input(
+            placeholder=words,
+            value=searched,
+            on_change=lambda event: select(search=str(event.value or "")),
+        ).props("dense outlined clearable debounce=250 type=search")
+        made.props["aria-label"] = "Search"
+
+
+def redraw(body: ui.element, draw: Callable[[], object]) -> None:
+    """Draw the inside of an element anew."""
+    body.clear()
+    with body:
+        draw()
 
 
 def retitle(made: ui.element, words: str) -> None:
@@ -205,6 +209,48 @@ def chip(state: str, word: str, letter: str = "") -> ui.element:
     return made
 
 
+class AnswerLine(ui.label):
+    """The line that says what has come of a request; unseen until then."""
+
+    def __init__(self) -> None:
+        super().__init__("")
+        self.classes("vf-answer").props["role"] = "status"
+        self.set_visibility(False)
+
+    def say(self, state: str, words: str) -> None:
+        """Show words: ``busy``, ``ok`` or ``error``."""
+        self.classes(replace=f"vf-answer vf-answer-{state}")
+        self.set_visibility(True)
+        self.set_text(words)
+
+    def tell(self, success: bool, words: str) -> None:
+        """Show what a service has answered."""
+        self.say("ok" if success else "error", printable(words, 500))
+
+
+async def agreed(
+    name: str,
+    title: str,
+    draw: Callable[[], None],
+    answers: tuple[str, str],
+    cancel: str = "flat no-caps autofocus",
+) -> bool:
+    """Ask in a dialog, which `draw` fills; return whether the second of both answers was given."""
+    with ui.dialog() as dialog, ui.card().classes("vf-dialog"):
+        dialog.props["aria-label"] = name
+        ui.label(title).classes("vf-dialog-title")
+        draw()
+        with element("div", "vf-actions"):
+            no, yes = answers
+            ui.button(no, on_click=lambda: dialog.submit(False), color=None).props(cancel)
+            confirm = ui.button(yes, on_click=lambda: dialog.submit(True), color=None)
+            confirm.props("unelevated no-caps").classes("vf-act-first")
+    is_agreed = bool(await dialog)
+    if not dialog.is_deleted:  # the visitor may have gone meanwhile
+        dialog.delete()
+    return is_agreed
+
+
 @contextmanager
 def card(title: str, css: str = "", note: str = "") -> Iterator[ui.element]:
     """Draw a card with a heading, and provide its body."""
@@ -217,20 +263,28 @@ def card(title: str, css: str = "", note: str = "") -> Iterator[ui.element]:
             yield body
 
 
-def table(
-    titles: Sequence[str], rows: Iterable[Sequence[str]], numeric: Sequence[int] = (), css: str = ""
-) -> ui.element:
-    """Draw a table of texts; columns of numbers are set to the right."""
-    with element("table", f"vf-list {css}") as made:
-        with element("thead"), element("tr"):
-            for column, title in enumerate(titles):
-                text("th", title, "vf-n" if column in numeric else "").props["scope"] = "col"
+def table_head(*titles: tuple[str, str]) -> None:
+    """Draw the head of a table: title and style of each column."""
+    with element("thead"), element("tr"):
+        for title, css in titles:
+            text("th", title, css).props["scope"] = "col"
+
+
+def table_row(*cells: tuple[str, str], css: str = "") -> ui.element:
+    """Draw a row of a table: text and style of each cell."""
+    with element("tr", css) as made:
+        for words, style in cells:
+            text("td", words, style)
+    return made
+
+
+def table(titles: Iterable[str], rows: Iterable[Iterable[str]]) -> None:
+    """Draw a table of texts."""
+    with element("table", "vf-list"):
+        table_head(*((title, "") for title in titles))
         with element("tbody"):
             for row in rows:
-                with element("tr"):
-                    for column, words in enumerate(row):
-                        text("td", words, "vf-n" if column in numeric else "")
-    return made
+                table_row(*((words, "") for words in row))
 
 
 class EntryList:

@@ -32,11 +32,21 @@ from valve_friction_ros.dashboard.charts import (
 from valve_friction_ros.dashboard.context import OfferedFile
 from valve_friction_ros.dashboard.live_state import Quantity, ValveView
 from valve_friction_ros.dashboard.live_strip import LiveStrip
-from valve_friction_ros.dashboard.pages.theme import chip, element, retitle, table, text
+from valve_friction_ros.dashboard.pages.theme import (
+    chip,
+    element,
+    link,
+    retitle,
+    table,
+    table_head,
+    table_row,
+    text,
+)
 from valve_friction_ros.dashboard.plant_rows import moment, quantity_texts
 from valve_friction_ros.health import AlarmEvent, Baseline
 from valve_friction_ros.history import HistoryEntry, ValveHistory, drift_text
 from valve_friction_ros.outside_text import printable
+from valve_friction_ros.streams import utc_day
 from valve_friction_ros.wording import number_and_width
 
 _VERDICTS = {"identified": "ok", "weak": "warn", "not identifiable": "unknown", "fixed": "unknown"}
@@ -62,25 +72,17 @@ def draw_parameters(view: ValveView) -> None:
 
 def _draw_parameter(one: Quantity) -> None:
     value, width = quantity_texts(one)
-    with element("tr"):
-        text("td", one.name.replace("_", " "))
-        text("td", value, "vf-n")
-        text("td", width, "vf-width")
-        text("td", one.unit, "vf-unit")
-        with element("td"):
-            chip(_VERDICTS.get(one.verdict, "unknown"), one.verdict or "–")
-            if one.reason:
-                text("small", one.reason, "vf-reason")
+    shown = ((value, "vf-n"), (width, "vf-width"), (one.unit, "vf-unit"))
+    with table_row((one.name.replace("_", " "), ""), *shown), element("td"):
+        chip(_VERDICTS.get(one.verdict, "unknown"), one.verdict or "–")
+        if one.reason:
+            text("small", one.reason, "vf-reason")
 
 
 def _draw_baseline(one: Quantity) -> None:
     value, width = number_and_width(one.value, one.half_width)
-    with element("tr", "vf-sub"):
-        text("td", "baseline")
-        text("td", value, "vf-n")
-        text("td", width, "vf-width")
-        text("td", "N", "vf-unit")
-        text("td", "")
+    shown = ((value, "vf-n"), (width, "vf-width"), ("N", "vf-unit"), ("", ""))
+    table_row(("baseline", ""), *shown, css="vf-sub")
 
 
 _STRIP_COLUMNS = 500
@@ -137,9 +139,6 @@ class ValveSignals:
             self._loop.run_chart_method("setOption", {"series": [{}, {"data": loop}]})
 
 
-_UTC = ZoneInfo("UTC")
-
-
 def draw_trend(
     kept: ValveHistory | None,
     problem: str | None,
@@ -189,9 +188,7 @@ def _trend_words(kept: ValveHistory) -> str:
     words = f"{trend.what[0].upper()}{trend.what[1:]}: {drift_text(trend)}"
     if trend.crossing is None:
         return f"{words}."
-    early, late = (
-        f"{moment(t, _UTC)[:10]}" for t in (trend.crossing.earliest, trend.crossing.latest)
-    )
+    early, late = map(utc_day, (trend.crossing.earliest, trend.crossing.latest))
     return f"{words} (95 %: {early} to {late})."
 
 
@@ -219,23 +216,21 @@ def draw_identifications(
         text("p", "No identification is kept of this valve.", "vf-none")
         return
     with element("table", "vf-list"):
-        with element("thead"), element("tr"):
-            for title, css in (("time", ""), ("level", ""), ("friction, N", "vf-n"),
-                               ("ratio", "vf-n"), ("diagnosis", ""), ("more", "")):  # fmt: skip
-                text("th", title, css).props["scope"] = "col"
+        table_head(("time", ""), ("level", ""), ("friction, N", "vf-n"), ("ratio", "vf-n"),
+                   ("diagnosis", ""), ("more", ""))  # fmt: skip
         with element("tbody"):
             for entry in reversed(history.entries[-_MOST_ROWS:]):
-                ratio = entry.diagnosis.ratio
-                with element("tr"):
-                    text("td", moment(entry.time, zone), "vf-when")
-                    text("td", "refused" if entry.refusal else entry.diagnosis.level.name)
-                    text("td", _friction(entry), "vf-n")
-                    text("td", "–" if ratio is None else f"{ratio.value:.2f}", "vf-n")
-                    words = entry.refusal or entry.diagnosis.message
-                    text("td", printable(words, 300), "vf-words")
-                    with element("td"), element("a", "vf-link", href=compare(entry.time)) as link:
-                        ui.label("compare")
-                        link.props["aria-label"] = f"Compare the one of {moment(entry.time, zone)}"
+                ratio, when = entry.diagnosis.ratio, moment(entry.time, zone)
+                row = table_row(
+                    (when, "vf-when"),
+                    ("refused" if entry.refusal else entry.diagnosis.level.name, ""),
+                    (_friction(entry), "vf-n"),
+                    ("–" if ratio is None else f"{ratio.value:.2f}", "vf-n"),
+                    (printable(entry.refusal or entry.diagnosis.message, 300), "vf-words"),
+                )
+                with row, element("td"):
+                    made = link("compare", compare(entry.time), "vf-link")
+                    made.props["aria-label"] = f"Compare the one of {when}"
     if len(history.entries) > _MOST_ROWS:
         text("p", f"The latest {_MOST_ROWS} of {len(history.entries)}.", "vf-none")
 
@@ -247,14 +242,10 @@ def draw_baselines(history: ValveHistory | None, zone: ZoneInfo) -> None:
         return
     table(
         ("time", "from then on", "before"),
-        [
-            (
-                moment(one.time, zone),
-                baseline_words(one.in_force),
-                baseline_words(one.replaced),
-            )
+        (
+            (moment(one.time, zone), *map(baseline_words, (one.in_force, one.replaced)))
             for one in reversed(history.baselines[-_MOST_ROWS:])
-        ],
+        ),
     )
 
 
@@ -265,31 +256,29 @@ def draw_alarms(history: ValveHistory | None, zone: ZoneInfo) -> None:
         return
     table(
         ("time", "level", "diagnosis", "recording"),
-        [
+        (
             (
-                moment(one.time, zone),
-                one.level.name,
-                printable(one.message, 300),
-                printable(one.path.name, 120),
+                moment(a.time, zone),
+                a.level.name,
+                printable(a.message, 300),
+                printable(a.path.name, 120),
             )
-            for one in reversed(history.alarms[-_MOST_ROWS:])
-        ],
+            for a in reversed(history.alarms[-_MOST_ROWS:])
+        ),
     )
 
 
 def draw_files(files: list[OfferedFile], zone: ZoneInfo) -> None:
     """Draw links to reports and bags."""
     if not files:
-        text(
-            "p", "No report and no recording is in the folders that the dashboard knows.", "vf-none"
-        )
+        words = "No report and no recording is in the folders that the dashboard knows."
+        text("p", words, "vf-none")
         return
     with element("table", "vf-list"), element("tbody"):
         for one in files:
             when = datetime.fromtimestamp(one.time, timezone.utc).astimezone(zone)
             with element("tr"), element("td", "vf-words"):
                 address = f"/files/{quote(one.kind)}/{quote(one.path)}"
-                with element("a", "vf-link", href=address, target="_blank", rel="noopener"):
-                    ui.label(one.label)
+                link(one.label, address, "vf-link", target="_blank", rel="noopener")
                 about = f"{one.kind}, {one.size / 1e6:.2f} MB"
                 text("small", f"{about}, {when:%Y-%m-%d %H:%M} {when.tzname()}", "vf-about")

@@ -27,12 +27,16 @@ from valve_friction_ros.dashboard.context import (
 from valve_friction_ros.dashboard.live_state import Heard, Quantity, ValveView
 from valve_friction_ros.dashboard.pages.alarm_page import AlarmStates
 from valve_friction_ros.dashboard.pages.theme import (
+    AnswerLine,
     EntryList,
     Frame,
+    agreed,
     card,
     chip,
     element,
     frame,
+    link,
+    redraw,
     retitle,
     text,
 )
@@ -81,8 +85,7 @@ class ValveHead:
     def draw(self) -> None:
         """Draw it, still without its values."""
         with element("div", "vf-valve-name"):
-            with element("a", "vf-back", href=self._page.link("/", **_selection_before())):
-                ui.label("‹ Plant")
+            link("‹ Plant", self._page.link("/", **_selection_before()), "vf-back")
             self._title = text("h1", "")
             self._chip = element("span")
             self._place = ui.label("").classes("vf-place")
@@ -96,9 +99,8 @@ class ValveHead:
         ui.page_title(f"{view.tag} · valve friction")
         self._place.set_text(view.node)
         letter = "" if state in ("silent", "unheard") else view.signal.value
-        self._chip.clear()
-        with self._chip:
-            chip(state, "not heard" if heard is None else state_words(heard), letter)
+        words = "not heard" if heard is None else state_words(heard)
+        redraw(self._chip, lambda: chip(state, words, letter))
         retitle(self._advice, view.advice)
         self._advice.set_visibility(bool(view.advice))
         retitle(self._sentence, view.sentence or "No message of this valve has been heard.")
@@ -240,9 +242,7 @@ class ValveActions:
         with element("div", "vf-actions", role="group", aria_label="Actions"):
             for service, (title, _) in _ACTIONS.items():
                 self._buttons.append(self._button(service, title))
-        self._says = ui.label("").classes("vf-answer")
-        self._says.props["role"] = "status"
-        self._says.set_visibility(False)
+        self._answer = AnswerLine()
 
     def _button(self, service: str, title: str) -> ui.button:
         async def act() -> None:
@@ -260,10 +260,9 @@ class ValveActions:
     async def _told_what_is_missing(self) -> str | None:
         """Say what a baseline lacks, and what may be done; return what shall be done now."""
         view = self._now()
-        with ui.dialog() as dialog, ui.card().classes("vf-dialog"):
-            dialog.props["aria-label"] = "Set baseline"
-            ui.label(f"No baseline of {view.tag} can be set now").classes("vf-dialog-title")
-            asked = [(one.of, one.lack.name) for one in view.lacks]
+        asked = [(one.of, one.lack.name) for one in view.lacks]
+
+        def draw() -> None:
             for title, some in (
                 ("What is missing", [one.words for one in view.lacks]),
                 ("What may be done", lack_remedies(asked)),
@@ -272,71 +271,47 @@ class ValveActions:
                 with element("ul", "vf-points"):
                     for words in some:
                         text("li", words)
-            with element("div", "vf-actions"):
-                ui.button("Close", on_click=lambda: dialog.submit(None), color=None).props(
-                    "flat no-caps autofocus"
-                )
-                ui.button("Identify", on_click=lambda: dialog.submit("identify"), color=None).props(
-                    "unelevated no-caps"
-                ).classes("vf-act-first")
-        chosen = await dialog
-        if not dialog.is_deleted:  # the visitor may have gone meanwhile
-            dialog.delete()
-        return "identify" if chosen else None
+
+        title = f"No baseline of {view.tag} can be set now"
+        is_agreed = await agreed("Set baseline", title, draw, ("Close", "Identify"))
+        return "identify" if is_agreed else None
 
     async def _agreed(self, service: str) -> bool:
         """Show the old and the new baseline, and ask; again where they have changed meanwhile."""
-        shown, agreed = None, True
-        while agreed and shown != (question := self._question(service)):
-            agreed = await self._asked(service, question, is_again=shown is not None)
+        shown, is_agreed = None, True
+        while is_agreed and shown != (question := self._question(service)):
+            is_agreed = await self._asked(service, question, is_again=shown is not None)
             shown = question
-        return agreed
+        return is_agreed
 
     def _question(self, service: str) -> Question:
         new = None if service == "set_baseline" else self._replaced()
         return question_of(self._now(), new)
 
     async def _asked(self, service: str, question: Question, is_again: bool) -> bool:
-        is_set = service == "set_baseline"
-        with ui.dialog() as dialog, ui.card().classes("vf-dialog"):
-            dialog.props["aria-label"] = _ACTIONS[service][0]
-            ui.label(f"{'Set' if is_set else 'Restore'} the baseline of {question.tag}?").classes(
-                "vf-dialog-title"
-            )
+        verb, note, yes = (
+            ("Set", "All later diagnoses compare with it: set it on a healthy valve only.",
+             "Set anyway" if question.alarm else "Set baseline")
+            if service == "set_baseline"
+            else ("Restore", "This undoes the last setting of the baseline.", "Restore baseline")
+        )  # fmt: skip
+
+        def draw() -> None:
             if is_again:
                 ui.label("This has changed while you were asked:").classes("vf-reason")
-            for name, words in (
-                ("in force now", question.old),
-                ("from then on", question.new),
-            ):
+            for name, words in (("in force now", question.old), ("from then on", question.new)):
                 with element("div", "vf-pair"):
                     ui.label(name)
                     ui.label(words)
-            ui.label(
-                "All later diagnoses compare with it: set it on a healthy valve only."
-                if is_set
-                else "This undoes the last setting of the baseline."
-            ).classes("vf-none")
+            ui.label(note).classes("vf-none")
             if question.alarm:
                 ui.label(
                     f"The valve is in {question.alarm}: make sure that it is healthy. "
                     "Another baseline may hide what is wrong."
                 ).classes("vf-answer vf-answer-error")
-            with element("div", "vf-actions"):
-                ui.button("Cancel", on_click=lambda: dialog.submit(False), color=None).props(
-                    "flat no-caps autofocus"
-                )
-                ui.button(
-                    ("Set anyway" if question.alarm else "Set baseline")
-                    if is_set
-                    else "Restore baseline",
-                    on_click=lambda: dialog.submit(True),
-                    color=None,
-                ).props("unelevated no-caps").classes("vf-act-first")
-        agreed = bool(await dialog)
-        if not dialog.is_deleted:  # the visitor may have gone meanwhile
-            dialog.delete()
-        return agreed
+
+        title = f"{verb} the baseline of {question.tag}?"
+        return await agreed(_ACTIONS[service][0], title, draw, ("Cancel", yes))
 
     async def _call(self, service: str) -> None:
         if self._busy is not None:
@@ -344,7 +319,7 @@ class ValveActions:
         self._busy = (service, time.monotonic())
         for button in self._buttons:
             button.disable()
-        self._say("busy", f"{_ACTIONS[service][1]} …")
+        self._answer.say("busy", f"{_ACTIONS[service][1]} …")
         try:
             answer = await self._operator.call(self._node, ServiceRequest(service))
         except Exception as error:  # noqa: BLE001 - a bug shall not leave the buttons dead
@@ -354,19 +329,14 @@ class ValveActions:
             button.enable()
         title = _ACTIONS[service][0].rstrip(" …")
         words = printable(answer.message, 2000) or "done"
-        self._say("ok" if answer.success else "error", f"{title}: {words}")
+        self._answer.say("ok" if answer.success else "error", f"{title}: {words}")
         self._done(service)
-
-    def _say(self, state: str, words: str) -> None:
-        self._says.classes(replace=f"vf-answer vf-answer-{state}")
-        self._says.set_visibility(True)
-        self._says.set_text(words)
 
     def tick(self) -> None:
         """Show for how long a call has been under way."""
         if self._busy is not None:
             service, begin = self._busy
-            self._says.set_text(f"{_ACTIONS[service][1]} … {time.monotonic() - begin:.0f} s")
+            self._answer.set_text(f"{_ACTIONS[service][1]} … {time.monotonic() - begin:.0f} s")
 
 
 _MOST_EVENTS = 500
@@ -411,18 +381,15 @@ class _ValvePage:
         return heard.view if heard is not None else ValveView(self._node, self._node)
 
     def draw(self) -> None:
-        """Draw the page, still without its values."""
         with element("article", "vf-valve"):
             with element("div", "vf-valve-head"):
                 self._head.draw()
                 self._actions = ValveActions(
                     self._context.operator, self._node, self._view, self._replaced, self._answered
                 )
-                if not self._context.is_live:
-                    pass
-                elif self._context.visitors.may_operate():
+                if self._context.is_live and self._context.visitors.may_operate():
                     self._actions.draw()
-                else:
+                elif self._context.is_live:
                     text("p", "Your account may view, not operate.", "vf-none")
             with element("div", "vf-cards"):
                 self._draw_cards()
@@ -491,13 +458,9 @@ class _ValvePage:
 
     def _show_values(self, view: ValveView) -> None:
         before, self._shown = self._shown, view
-        if before is None or (before.parameters, before.baseline) != (
-            view.parameters,
-            view.baseline,
-        ):
-            self._parameters_body.clear()
-            with self._parameters_body:
-                draw_parameters(view)
+        shown = (view.parameters, view.baseline)
+        if before is None or (before.parameters, before.baseline) != shown:
+            redraw(self._parameters_body, lambda: draw_parameters(view))
         groups = view.groups()
         for key, entries in self._lists.items():
             entries.show(groups[key])
@@ -526,9 +489,7 @@ class _ValvePage:
         if self._context.is_live:
             draws = (*draws, (self._alarms_body, lambda: draw_alarms(kept, zone)))
         for body, draw in draws:
-            body.clear()
-            with body:
-                draw()
+            redraw(body, draw)
 
     async def _events(self) -> list[AlarmEvent]:
         """Read the events of the valve's alarms."""
@@ -567,5 +528,5 @@ def valve_page(context: DashboardContext, query: dict[str, str]) -> None:
     def here(common: dict[str, str]) -> str:
         return f"/valve?{urlencode({'node': node, **common})}"
 
-    with frame(context, query, "Valve · valve friction", here) as inside:
-        _ValvePage(context, node, inside).draw()
+    with frame(context, query, "Valve · valve friction", here) as page:
+        _ValvePage(context, node, page).draw()

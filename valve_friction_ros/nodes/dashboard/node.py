@@ -41,9 +41,9 @@ from valve_friction_ros.dashboard import (
     Unread,
 )
 from valve_friction_ros.dashboard.accounts import Access, accounts_from
+from valve_friction_ros.dashboard.alarm_list import HistoryOperator
 from valve_friction_ros.dashboard.context import INSTALL, DashboardContext, GuardedOperator
 from valve_friction_ros.dashboard.history_cache import HistoryCache
-from valve_friction_ros.dashboard.kept_valves import HistoryOperator
 from valve_friction_ros.dashboard.live_state import Sources
 from valve_friction_ros.dashboard.live_strip import LiveStrip
 from valve_friction_ros.history import server_from
