@@ -14,132 +14,116 @@ from typing import TYPE_CHECKING
 from valve_friction_ros.on_demand import names_on_demand
 
 if TYPE_CHECKING:
-    from valve_friction_ros.identification.drawing import Curve, Drawing, Exhibit, Panel
-    from valve_friction_ros.identification.engine.expectation import expected_half_widths
-    from valve_friction_ros.identification.engine.method import identify_bench, identify_plant
-    from valve_friction_ros.identification.friction_drawing import IMPERFECTIONS_FOUND
+    from valve_friction_ros.identification.drawing import (
+        Curve as Curve,
+        Drawing as Drawing,
+        Exhibit as Exhibit,
+        Panel as Panel,
+    )
+    from valve_friction_ros.identification.engine.expectation import (
+        expected_half_widths as expected_half_widths,
+    )
+    from valve_friction_ros.identification.engine.method import (
+        identify_bench as identify_bench,
+        identify_plant as identify_plant,
+    )
+    from valve_friction_ros.identification.friction_drawing import (
+        IMPERFECTIONS_FOUND as IMPERFECTIONS_FOUND,
+    )
     from valve_friction_ros.identification.methods import (
-        METHODS,
-        Method,
-        identify,
-        method_named,
+        METHODS as METHODS,
+        Method as Method,
+        identify as identify,
+        method_named as method_named,
     )
     from valve_friction_ros.identification.model_to_simulate import (
-        IdentifiedModel,
-        identified_model,
+        IdentifiedModel as IdentifiedModel,
+        identified_model as identified_model,
     )
-    from valve_friction_ros.identification.published.estimate import Estimate
-    from valve_friction_ros.identification.published.identify import published_estimate
-    from valve_friction_ros.identification.published.method import identify_published
-    from valve_friction_ros.identification.published.sweep import Sweep, sweep_thresholds
-    from valve_friction_ros.identification.refusal import RefusalError
+    from valve_friction_ros.identification.published.estimate import (
+        Estimate as Estimate,
+    )
+    from valve_friction_ros.identification.published.identify import (
+        published_estimate as published_estimate,
+    )
+    from valve_friction_ros.identification.published.method import (
+        identify_published as identify_published,
+    )
+    from valve_friction_ros.identification.published.sweep import (
+        Sweep as Sweep,
+        sweep_thresholds as sweep_thresholds,
+    )
+    from valve_friction_ros.identification.refusal import (
+        RefusalError as RefusalError,
+    )
     from valve_friction_ros.identification.rendering import (
-        parameter_cells,
-        parameter_columns,
-        parameter_mapping,
-        plain,
+        parameter_cells as parameter_cells,
+        parameter_columns as parameter_columns,
+        parameter_mapping as parameter_mapping,
+        plain as plain,
     )
-    from valve_friction_ros.identification.result import Result, StemComparison
+    from valve_friction_ros.identification.result import (
+        Result as Result,
+        StemComparison as StemComparison,
+    )
     from valve_friction_ros.identification.settings import (
-        CALIBRATION,
-        DEFAULT_METHOD,
-        FIXABLE,
-        FORMER_METHODS,
-        METHOD_NAMES,
-        MOST_UNCERTAIN,
-        STATED,
-        TIMING_UNCERTAINTY,
-        IdentificationSettings,
-        current_name,
+        CALIBRATION as CALIBRATION,
+        DEFAULT_METHOD as DEFAULT_METHOD,
+        FIXABLE as FIXABLE,
+        FORMER_METHODS as FORMER_METHODS,
+        METHOD_NAMES as METHOD_NAMES,
+        MOST_UNCERTAIN as MOST_UNCERTAIN,
+        STATED as STATED,
+        TIMING_UNCERTAINTY as TIMING_UNCERTAINTY,
+        IdentificationSettings as IdentificationSettings,
+        current_name as current_name,
     )
-    from valve_friction_ros.identification.signature.force_balance import identify_signature
-    from valve_friction_ros.identification.signature.strokes import BreakawayPoint, SignatureStroke
+    from valve_friction_ros.identification.signature.force_balance import (
+        identify_signature as identify_signature,
+    )
+    from valve_friction_ros.identification.signature.strokes import (
+        BreakawayPoint as BreakawayPoint,
+        SignatureStroke as SignatureStroke,
+    )
     from valve_friction_ros.identification.signature.valve_signature import (
-        ValveSignature,
-        valve_signature,
+        ValveSignature as ValveSignature,
+        valve_signature as valve_signature,
     )
     from valve_friction_ros.identification.steps.step_response import (
-        Bracket,
-        StepMetrics,
-        StepTest,
-        find_steps,
-        step_test,
+        Bracket as Bracket,
+        StepMetrics as StepMetrics,
+        StepTest as StepTest,
+        find_steps as find_steps,
+        step_test as step_test,
     )
-    from valve_friction_ros.identification.steps.validation import Validation, validate
-    from valve_friction_ros.identification.trust.misfit import LEAST_FIT, Misfit
-    from valve_friction_ros.identification.trust.plausible_units import require_valve_units
-    from valve_friction_ros.identification.trust.sliding import COMPARABLE, SPEED_EXPONENT
-    from valve_friction_ros.identification.trust.verdict import Parameter, Verdict
+    from valve_friction_ros.identification.steps.validation import (
+        Validation as Validation,
+        validate as validate,
+    )
+    from valve_friction_ros.identification.trust.misfit import (
+        LEAST_FIT as LEAST_FIT,
+        Misfit as Misfit,
+    )
+    from valve_friction_ros.identification.trust.plausible_units import (
+        require_valve_units as require_valve_units,
+    )
+    from valve_friction_ros.identification.trust.sliding import (
+        COMPARABLE as COMPARABLE,
+        SPEED_EXPONENT as SPEED_EXPONENT,
+    )
+    from valve_friction_ros.identification.trust.verdict import (
+        Parameter as Parameter,
+        Verdict as Verdict,
+    )
     from valve_friction_ros.identification.units import (
-        CLOCK_OFFSET,
-        PARAMETER_UNITS,
-        SLIDING,
-        UNITS,
+        CLOCK_OFFSET as CLOCK_OFFSET,
+        PARAMETER_UNITS as PARAMETER_UNITS,
+        SLIDING as SLIDING,
+        UNITS as UNITS,
     )
-    from valve_friction_ros.wording import percentage, two_digits
+    from valve_friction_ros.wording import (
+        percentage as percentage,
+        two_digits as two_digits,
+    )
 else:
     __getattr__ = names_on_demand(__name__)
-
-__all__ = [
-    "CALIBRATION",
-    "CLOCK_OFFSET",
-    "COMPARABLE",
-    "DEFAULT_METHOD",
-    "FIXABLE",
-    "FORMER_METHODS",
-    "IMPERFECTIONS_FOUND",
-    "LEAST_FIT",
-    "METHODS",
-    "METHOD_NAMES",
-    "MOST_UNCERTAIN",
-    "PARAMETER_UNITS",
-    "SLIDING",
-    "SPEED_EXPONENT",
-    "STATED",
-    "TIMING_UNCERTAINTY",
-    "UNITS",
-    "Bracket",
-    "BreakawayPoint",
-    "Curve",
-    "Drawing",
-    "Estimate",
-    "Exhibit",
-    "IdentificationSettings",
-    "IdentifiedModel",
-    "Method",
-    "Misfit",
-    "Panel",
-    "Parameter",
-    "RefusalError",
-    "Result",
-    "SignatureStroke",
-    "StemComparison",
-    "StepMetrics",
-    "StepTest",
-    "Sweep",
-    "Validation",
-    "ValveSignature",
-    "Verdict",
-    "current_name",
-    "expected_half_widths",
-    "find_steps",
-    "identified_model",
-    "identify",
-    "identify_bench",
-    "identify_plant",
-    "identify_published",
-    "identify_signature",
-    "method_named",
-    "parameter_cells",
-    "parameter_columns",
-    "parameter_mapping",
-    "percentage",
-    "plain",
-    "published_estimate",
-    "require_valve_units",
-    "step_test",
-    "sweep_thresholds",
-    "two_digits",
-    "validate",
-    "valve_signature",
-]

@@ -14,60 +14,44 @@ from typing import TYPE_CHECKING
 from valve_friction_ros.on_demand import names_on_demand
 
 if TYPE_CHECKING:
-    from valve_friction_ros.model.drive import DEFAULT_LAG, Drive
+    from valve_friction_ros.model.drive import (
+        DEFAULT_LAG as DEFAULT_LAG,
+        Drive as Drive,
+    )
     from valve_friction_ros.model.excitations import (
-        BENCH_VALVE,
-        GRAPHITE_PACKING,
-        GRAPHITE_VALVE,
-        HIGH_FRICTION,
-        LOW_FRICTION,
-        PRESSURE_RANGE,
-        Excitation,
-        IsaSteps,
-        SampledPressure,
-        SineWave,
-        SquareWave,
-        TriangleWave,
+        BENCH_VALVE as BENCH_VALVE,
+        GRAPHITE_PACKING as GRAPHITE_PACKING,
+        GRAPHITE_VALVE as GRAPHITE_VALVE,
+        HIGH_FRICTION as HIGH_FRICTION,
+        LOW_FRICTION as LOW_FRICTION,
+        PRESSURE_RANGE as PRESSURE_RANGE,
+        Excitation as Excitation,
+        IsaSteps as IsaSteps,
+        SampledPressure as SampledPressure,
+        SineWave as SineWave,
+        SquareWave as SquareWave,
+        TriangleWave as TriangleWave,
     )
-    from valve_friction_ros.model.instruments import SensorNoise, converter_response
-    from valve_friction_ros.model.karnopp_parameters import KarnoppParameters
-    from valve_friction_ros.model.recording import Recording
+    from valve_friction_ros.model.instruments import (
+        SensorNoise as SensorNoise,
+        converter_response as converter_response,
+    )
+    from valve_friction_ros.model.karnopp_parameters import (
+        KarnoppParameters as KarnoppParameters,
+    )
+    from valve_friction_ros.model.recording import (
+        Recording as Recording,
+    )
     from valve_friction_ros.model.simulation import (
-        StemState,
-        Trajectory,
-        advance,
-        balanced_state,
-        compile_kernels,
-        simulate,
+        StemState as StemState,
+        Trajectory as Trajectory,
+        advance as advance,
+        balanced_state as balanced_state,
+        compile_kernels as compile_kernels,
+        simulate as simulate,
     )
-    from valve_friction_ros.model.valve import Valve
+    from valve_friction_ros.model.valve import (
+        Valve as Valve,
+    )
 else:
     __getattr__ = names_on_demand(__name__)
-
-__all__ = [
-    "BENCH_VALVE",
-    "DEFAULT_LAG",
-    "GRAPHITE_PACKING",
-    "GRAPHITE_VALVE",
-    "HIGH_FRICTION",
-    "LOW_FRICTION",
-    "PRESSURE_RANGE",
-    "Drive",
-    "Excitation",
-    "IsaSteps",
-    "KarnoppParameters",
-    "Recording",
-    "SampledPressure",
-    "SensorNoise",
-    "SineWave",
-    "SquareWave",
-    "StemState",
-    "Trajectory",
-    "TriangleWave",
-    "Valve",
-    "advance",
-    "balanced_state",
-    "compile_kernels",
-    "converter_response",
-    "simulate",
-]

@@ -14,32 +14,27 @@ from typing import TYPE_CHECKING
 from valve_friction_ros.on_demand import names_on_demand
 
 if TYPE_CHECKING:
-    from valve_friction_ros.planning.conditions import AIMS, Conditions, Limits
-    from valve_friction_ros.planning.search import StrokePlan, plan_remarks, plan_test
-    from valve_friction_ros.planning.steps import SetPoint, set_points, signal_range
+    from valve_friction_ros.planning.conditions import (
+        AIMS as AIMS,
+        Conditions as Conditions,
+        Limits as Limits,
+    )
+    from valve_friction_ros.planning.search import (
+        StrokePlan as StrokePlan,
+        plan_remarks as plan_remarks,
+        plan_test as plan_test,
+    )
+    from valve_friction_ros.planning.steps import (
+        SetPoint as SetPoint,
+        set_points as set_points,
+        signal_range as signal_range,
+    )
     from valve_friction_ros.planning.stroke_test import (
-        FrictionRange,
-        Pattern,
-        StrokeTest,
-        known_friction,
-        unknown_friction,
+        FrictionRange as FrictionRange,
+        Pattern as Pattern,
+        StrokeTest as StrokeTest,
+        known_friction as known_friction,
+        unknown_friction as unknown_friction,
     )
 else:
     __getattr__ = names_on_demand(__name__)
-
-__all__ = [
-    "AIMS",
-    "Conditions",
-    "FrictionRange",
-    "Limits",
-    "Pattern",
-    "SetPoint",
-    "StrokePlan",
-    "StrokeTest",
-    "known_friction",
-    "plan_remarks",
-    "plan_test",
-    "set_points",
-    "signal_range",
-    "unknown_friction",
-]

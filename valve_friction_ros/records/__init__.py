@@ -14,17 +14,17 @@ from typing import TYPE_CHECKING
 from valve_friction_ros.on_demand import names_on_demand
 
 if TYPE_CHECKING:
-    from valve_friction_ros.records.recorded_valve import RecordedValve, Stretch
-    from valve_friction_ros.records.recordings import ReadingOptions, read_recordings
-    from valve_friction_ros.records.valve_file import ValveFile, read_valve_file
+    from valve_friction_ros.records.recorded_valve import (
+        RecordedValve as RecordedValve,
+        Stretch as Stretch,
+    )
+    from valve_friction_ros.records.recordings import (
+        ReadingOptions as ReadingOptions,
+        read_recordings as read_recordings,
+    )
+    from valve_friction_ros.records.valve_file import (
+        ValveFile as ValveFile,
+        read_valve_file as read_valve_file,
+    )
 else:
     __getattr__ = names_on_demand(__name__)
-
-__all__ = [
-    "ReadingOptions",
-    "RecordedValve",
-    "Stretch",
-    "ValveFile",
-    "read_recordings",
-    "read_valve_file",
-]
