@@ -313,8 +313,15 @@ def _least_viscous(
 ) -> Mapping[str, ReportedNumber]:
     """Return the numbers of a fit apart with less viscous friction, if it follows the stem too.
 
-    However large its lags are: how probable they are is another question.
+    However large its lags are, unless a stated timing excludes them.
     """
-    able = [fit for fit in fits if fit.is_apart and fit.inflation <= _FOLLOWS * fits[0].inflation]
-    last = min((fits[0], *able), key=lambda fit: fit.at["viscous_friction"])
+    best = fits[0]
+    able = [
+        fit
+        for fit in fits
+        if fit.is_apart
+        and fit.inflation <= _FOLLOWS * best.inflation
+        and fit.stages[-1].penalty < best.stages[-1].penalty + UNLIKELY
+    ]
+    last = min((best, *able), key=lambda fit: fit.at["viscous_friction"])
     return numbers_at(last.model, last.at)
