@@ -281,7 +281,7 @@ _USAGE_HEIGHT = 1.5
 
 
 def trend_figure(histories: Sequence[ValveHistory], now: int | None = None) -> Figure:
-    """Draw the friction of valves over time, one panel a valve, over one time axis.
+    """Draw the friction of valves over time, one panel per valve, over one time axis.
 
     It is the sliding friction at the speed of the last baseline, where that has one, else F_c.
     Below it is the travelled distance of each day, where any was counted within that time.

@@ -243,7 +243,7 @@ def keep_usage(file: HistoryFile, valve: KeptValve, run: str, days: Iterable[Use
 
     The usage of a day is that of the whole run: it takes the place of what the run has kept of this
     day before, so that keeping it twice changes nothing. What other runs have kept of days
-    before the newest two becomes one row a day: of a valve one run writes at a time.
+    before the newest two becomes one row per day: of a valve one run writes at a time.
     """
     with _rows_of(file, valve) as rows:
         rows.put(tables.usage, *(_used(run, one) for one in days))

@@ -42,7 +42,7 @@ class StemState:
 
 
 class Trajectory(NamedTuple):
-    """Simulated stem, one value a sample.
+    """Simulated stem, one value per sample.
 
     Attributes
     ----------

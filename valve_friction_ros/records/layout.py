@@ -129,7 +129,7 @@ class Layout:
             if self.raw.encoding not in ("utf-8", "utf-8-sig"):
                 parts.append({"cp1252": "Windows-1252"}.get(self.raw.encoding, self.raw.encoding))
         if self.tag_place is not None:
-            parts.append("one value a row")
+            parts.append("one value per row")
         parts += sorted({self._time_words(form_of) for form_of in self.times.values()})
         for name, signals in list(self.valves.items())[:_MOST_LABELS]:
             told = [f"{one.quantity} {quoted(one.name)}" + _in_unit(one.unit) for one in signals]
