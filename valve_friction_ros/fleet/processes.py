@@ -141,9 +141,9 @@ def in_processes(
     """Yield tasks with their answers, or a `DeadWorker`, as they finish in several processes.
 
     Each process has one task at a time, so that of one that dies it is known what it died of; a
-    new one takes its place. Compiled libraries get one thread per process. `work` is a function of a
-    module, since the processes are started anew. Once `stopped` returns True nothing more is handed
-    out, and what is being done is given up.
+    new one takes its place. Compiled libraries get one thread per process. `work` is a function of
+    a module, since the processes are started anew. Once `stopped` returns True nothing more is
+    handed out, and what is being done is given up.
     """
     waiting = iter(tasks)
     drafts = TemporaryDirectory()  # what a killed worker leaves behind goes with it
