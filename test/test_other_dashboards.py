@@ -78,7 +78,7 @@ def test_foxglove_names_what_there_is():
         elif panel["panelType"] == "ServiceCall":
             node, _, service = config["serviceName"].rpartition("/")
             assert node == "/fv_101/identifier"
-            assert f'("{service}", self._' in sources()
+            assert re.search(rf'\("{service}", (self\._|partial\()', sources())
         else:
             assert panel["panelType"] == "DiagnosticsDetail"
             assert config["selectedName"] == STATUS

@@ -198,7 +198,7 @@ def test_an_alarm_by_the_sliding_friction_where_the_coulomb_friction_is_vague(li
 
 
 def test_a_baseline_of_no_use_is_refused(live):
-    live.start_identifier({"timing_uncertainty": 0.1})
+    live.start_identifier({"timing_uncertainty": 0.3})
     live.client.identified(square_record(LOW_FRICTION))
     answer = live.client.trigger("set_baseline")
     assert not answer.success

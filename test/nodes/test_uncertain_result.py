@@ -29,7 +29,7 @@ def record_of(share):
 
 
 HEALTHY, TIGHT, LOOSE = quick_record(), quick_record(HIGH_FRICTION), record_of(0.6)
-UNSURE = SensorNoise(7e-5, 140.0, seed=1).applied_to(record_of(1.58))
+UNSURE = SensorNoise(15e-5, 300.0, seed=1).applied_to(record_of(1.42))
 
 
 def test_an_alarm_ends_by_a_sure_result_only_also_over_a_restart(live):

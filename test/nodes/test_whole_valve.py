@@ -23,7 +23,7 @@ OK, WARN, ERROR = b"\x00", b"\x01", b"\x02"
 HEALTHY = quick_record()
 SOFT = replace(LOW_FRICTION, spring_constant=LOW_FRICTION.spring_constant * 2 / 3)
 WEAK = quick_record(SOFT)
-HARDLY = SensorNoise(1e-5, 100.0, 3).applied_to(
+HARDLY = SensorNoise(3e-5, 300.0, 3).applied_to(
     simulated(5e4 + 5e3 * np.sin(2 * np.pi * np.arange(500) / 250), 0.01, SOFT)
 )
 """Small strokes of the valve of the soft spring, which hardly show it."""

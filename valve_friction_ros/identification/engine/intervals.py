@@ -294,11 +294,16 @@ def _over_lags(
         mean = float(probability @ values)
         timing = math.sqrt(float(probability @ (values - mean) ** 2))
         budget = _budget(best, stage, first)
+        half_width = mixture_half_width(probability, values, own)
+        # The tails of the lag are heavier than normal ones: its share is that of the interval.
+        whole = half_width / NORMAL_QUANTILE
+        record = min(math.sqrt(float(probability @ own**2)), whole)
+        timing = min(timing, math.sqrt(max(whole**2 - record**2, 0.0)))
         found[name] = Estimated(
             mean,
-            mixture_half_width(probability, values, own),
+            half_width,
             Budget(
-                math.sqrt(float(probability @ own**2)),
+                record,
                 timing,
                 budget.sources,
                 timing * math.sqrt(max(unsaid, 0.0)),
