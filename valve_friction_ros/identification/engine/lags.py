@@ -54,8 +54,8 @@ _LIKELY = 16.0
 """Cost over the best up to which fits show how rough the likelihood is."""
 
 _DEPENDENT = 1.5
-"""Factor by which the fits' own likelihood of a lag is too sharp: what a model leaves of a move is
-of one piece. Found on drawn valves, as the inflation of the residual alone left 12 % outside."""
+"""Factor by which the logarithm of the likelihood of a lag is too sharp: the residuals of one move
+go together. Found on drawn valves."""
 
 _NEGLIGIBLE, _HALVINGS = 1e-6, 24
 """Probability of a lag that no interval notices; halvings by which an interval is found."""
