@@ -12,9 +12,11 @@
 import math
 import sqlite3
 from contextlib import closing
-from dataclasses import fields, replace
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
+import full_history
 import pytest
 from histories import DAY, OTHER, SECOND, START, VALVE, make_version_5, success
 from test_file import write_version_2
@@ -45,17 +47,13 @@ from valve_friction_ros.history import (
     valve_histories,
 )
 from valve_friction_ros.model import Valve
-from valve_friction_ros.response import StepAnswer, summarised
+from valve_friction_ros.response import summarised
 from valve_friction_ros.usage import BINS, Usage, UsedDay
 
 TRAVEL = 0.02
 
 
-def answer(place, dead_time=0.25, **changes):
-    flags = {one.name: True for one in fields(StepAnswer) if one.type in (bool, "bool")}
-    numbers = {one.name: 0.125 for one in fields(StepAnswer) if one.name not in flags}
-    own = {"stamp": START + place * SECOND, "dead_time": dead_time, "at_stop": False}
-    return replace(StepAnswer(**numbers, **flags), **{**own, **changes})
+answer = partial(full_history.answer, at_stop=False)
 
 
 @pytest.fixture

@@ -14,12 +14,12 @@ import math
 import subprocess
 import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from records import simulated
 
+from benchmark.emps import PUBLISHED, RECORD
 from valve_friction_ros.identification import (
     DEFAULT_METHOD,
     FORMER_METHODS,
@@ -387,19 +387,6 @@ def test_of_a_force_scale_it_has_one_power(benches, bench_record):
     value = one.parameters["sliding_friction"].value
     assert other.parameters["sliding_friction"].value == pytest.approx(2 * value, rel=1e-5)
     assert other.sliding_speed == pytest.approx(one.sliding_speed, rel=1e-5)
-
-
-RECORD = (
-    Path(__file__).resolve().parents[3] / "shared" / "data" / "emps" / "emps_identification.csv"
-)
-
-# Published IDIM-LS values.
-PUBLISHED = {
-    "mass": 95.1089,
-    "viscous_friction": 203.5034,
-    "coulomb_friction": 20.3935,
-    "spring_preload": -3.1648,
-}
 
 
 @pytest.fixture(scope="module")

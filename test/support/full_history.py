@@ -62,11 +62,11 @@ SLIDING = SlidingFriction(205.5, 3.25, 9.5e-3)
 NUMBERS = {"spring_constant": Measured(2.05e5, 40.0), "lag": Measured(-0.002, 0.003)}
 
 
-def answer(place, dead_time=0.25):
+def answer(place, dead_time=0.25, **changes):
     flags = {one.name: True for one in fields(StepAnswer) if one.type in (bool, "bool")}
     numbers = {one.name: 0.125 for one in fields(StepAnswer) if one.name not in flags}
-    numbers |= {"stamp": START + place * SECOND, "dead_time": dead_time}
-    return StepAnswer(**numbers, **flags)
+    own = {"stamp": START + place * SECOND, "dead_time": dead_time}
+    return StepAnswer(**{**numbers, **flags, **own, **changes})
 
 
 def service_move(number):

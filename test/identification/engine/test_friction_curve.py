@@ -363,31 +363,6 @@ def test_averaging_keeps_a_straight_line(length):
     np.testing.assert_allclose(found[inner], line[inner], rtol=1e-12)
 
 
-class TestLagPrior:
-    LAGS = np.linspace(-2.0, 2.0, 400_001)
-
-    def test_unstated(self):
-        """Cauchy's: half within 4 ms, 95 % within 51 ms, 2·arctan(x/4 ms)/π; never impossible."""
-        density = np.exp(LagPrior().log_density(self.LAGS))
-        share = [np.sum(density[np.abs(self.LAGS) < reach]) for reach in (4e-3, 50.82e-3)]
-        inside = 2.0 / math.pi * math.atan(self.LAGS[-1] / 4e-3)
-        expected = np.array([0.5, 0.95]) / inside
-        assert np.array(share) / np.sum(density) == pytest.approx(expected, abs=1e-3)
-        assert not LagPrior().is_known
-
-    def test_stated(self):
-        """A Gaussian."""
-        density = LagPrior(0.02).log_density(np.array([0.0, 0.02, 0.06]))
-        np.testing.assert_allclose(density - density[0], [0.0, -0.5, -4.5])
-        assert LagPrior(0.02).precision(0.3) == pytest.approx(0.02**-2)
-
-    def test_its_precision_falls_where_it_is_flat(self):
-        assert LagPrior().precision(0.0) > LagPrior().precision(0.05) > 0.0
-
-    def test_known(self):
-        assert LagPrior(0.0).is_known
-
-
 def number(value, half_width):
     return Estimated(value, half_width, Budget(half_width / 2, 0.0, {}))
 

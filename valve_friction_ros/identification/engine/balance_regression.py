@@ -32,6 +32,7 @@ from valve_friction_ros.identification.engine.lags import (
     LagPrior,
     mixture_half_width,
     normal,
+    share_of_timing,
     spread_of,
 )
 from valve_friction_ros.identification.engine.numbers import RECTANGLE
@@ -45,7 +46,6 @@ from valve_friction_ros.identification.engine.weights import inflation
 from valve_friction_ros.identification.trust.sliding import SPEED_EXPONENT
 from valve_friction_ros.identification.trust.uncertainty import (
     MEDIAN_MAGNITUDE,
-    NORMAL_QUANTILE,
 )
 from valve_friction_ros.identification.units import SLIDING
 from valve_friction_ros.model.valve import Valve
@@ -690,9 +690,7 @@ class Posterior:
             timing = math.sqrt(float(np.sum(weights * (values - means[:, None]) ** 2)))
         open_ = float(np.sum(weights * record**2) + shares @ (means - mean) ** 2)
         high = mixture_half_width(np.asarray(weights), values, record)
-        # The tails of the lag are heavier than normal ones: its share is that of the interval.
-        whole = high / NORMAL_QUANTILE
-        timing = min(timing, math.sqrt(max(whole**2 - open_, 0.0)))
+        timing = share_of_timing(high, math.sqrt(open_), timing)
         sources = {ROUNDING: rounding} if rounding > 0.0 else {}
         return Estimated(
             mean, high, Budget(math.sqrt(open_), timing, sources, timing * self._unsaid()), rival

@@ -23,6 +23,7 @@ from valve_friction_ros.identification.engine.lags import (
     LagPrior,
     LagProfile,
     mixture_half_width,
+    share_of_timing,
     spread_of,
 )
 from valve_friction_ros.identification.engine.numbers import (
@@ -39,8 +40,6 @@ from valve_friction_ros.identification.units import SLIDING
 
 NumbersAt = Callable[[BroadModel, Coordinates], Mapping[str, ReportedNumber]]
 """Function of a model and a place of its fit: numbers by name."""
-
-_Known = Mapping[PosteriorFit, ReportedNumber]
 
 NOISE_LIKE = 4.0
 """Inflation of the residual up to which it may be noise of a sensor that is not quite white."""
@@ -177,12 +176,8 @@ def _deviation(fit: PosteriorFit, number: ReportedNumber) -> float:
     """
     stage = fit.stages[-1]
     gradient = _vector(fit, number)
-    along = stage.covariance @ gradient
-    variance = float(gradient @ along) + number.definition**2
-    if (lags := fit.lags).any():
-        variance -= float(lags @ along) ** 2 / max(
-            float(lags @ stage.covariance @ lags), np.finfo(float).tiny
-        )
+    variance = float(gradient @ stage.covariance @ gradient) + number.definition**2
+    variance -= float(gradient @ fit.along_lag) ** 2 * fit.lag_variance
     if "delay" in fit.names:
         lag = fit.precision[fit.names.index("delay")] ** -0.5 if _swings(stage) else 0.0
         lag = math.hypot(lag, _unseen_moment(fit) if stage.at["slip_force"] > 0.0 else 0.0)
@@ -277,39 +272,24 @@ def _over_lags(
     prior = lag if lag.deviation is None else LagPrior(math.inf)
     probability = prior.probability(profile.log_likelihood)
     unsaid = 1.0 - spread_of(probability) ** 2 / spread_of(np.exp(profile.log_likelihood)) ** 2
-    lags = best.lags
-    along = stage.covariance @ lags / float(lags @ stage.covariance @ lags)
     found = {}
-    for name, first in numbers_at(best.model, best.at).items():
+    for name, first in places[best].items():
         known = {fit: numbers.get(name, first) for fit, numbers in places.items()}
-
-        def value(fit: PosteriorFit, known: _Known = known) -> float:
-            return known[fit].value
-
-        def deviation(fit: PosteriorFit, known: _Known = known) -> float:
-            return _deviation(fit, known[fit])
-
-        values = profile.along(value, float(_vector(best, first) @ along))
-        own = profile.along(deviation, 0.0)
+        slope = float(_vector(best, first) @ best.along_lag)
+        values = profile.along({fit: one.value for fit, one in known.items()}, slope)
+        own = profile.along({fit: _deviation(fit, one) for fit, one in known.items()}, 0.0)
         mean = float(probability @ values)
-        timing = math.sqrt(float(probability @ (values - mean) ** 2))
-        budget = _budget(best, stage, first)
         half_width = mixture_half_width(probability, values, own)
-        # The tails of the lag are heavier than normal ones: its share is that of the interval.
-        whole = half_width / NORMAL_QUANTILE
-        record = min(math.sqrt(float(probability @ own**2)), whole)
-        timing = min(timing, math.sqrt(max(whole**2 - record**2, 0.0)))
-        found[name] = Estimated(
-            mean,
-            half_width,
-            Budget(
-                record,
-                timing,
-                budget.sources,
-                timing * math.sqrt(max(unsaid, 0.0)),
-            ),
-            late.get(name, first).value,
+        record = min(math.sqrt(float(probability @ own**2)), half_width / NORMAL_QUANTILE)
+        timing = math.sqrt(float(probability @ (values - mean) ** 2))
+        timing = share_of_timing(half_width, record, timing)
+        budget = Budget(
+            record,
+            timing,
+            _budget(best, stage, first).sources,
+            timing * math.sqrt(max(unsaid, 0.0)),
         )
+        found[name] = Estimated(mean, half_width, budget, late.get(name, first).value)
     return found
 
 

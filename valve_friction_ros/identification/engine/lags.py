@@ -16,7 +16,7 @@ whole lag is therefore followed through the fits of the simulated stem, each hel
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from valve_friction_ros.identification.engine.imperfections import TIMING
 from valve_friction_ros.identification.engine.posterior_fit import PosteriorFit
 from valve_friction_ros.identification.settings import TIMING_UNCERTAINTY
-from valve_friction_ros.identification.trust.uncertainty import CONFIDENCE
+from valve_friction_ros.identification.trust.uncertainty import CONFIDENCE, NORMAL_QUANTILE
 
 _Array = NDArray[np.float64]
 
@@ -141,6 +141,16 @@ def mixture_half_width(weights: _Array, values: _Array, deviations: _Array) -> f
     return high
 
 
+def share_of_timing(half_width: float, record: float, timing: float) -> float:
+    """Return the standard uncertainty of the lag as its share of an interval.
+
+    The tails of the lag are heavier than normal ones: beside that of the `record` it is at most
+    what the `half_width` leaves.
+    """
+    whole = half_width / NORMAL_QUANTILE
+    return min(timing, math.sqrt(max(whole**2 - record**2, 0.0)))
+
+
 def spread_of(density: _Array) -> float:
     """Return the deviation of the lag by its density at `LAGS`, s, at least `_LEAST_DEVIATION`."""
     probability = density / np.sum(density)
@@ -208,10 +218,7 @@ class LagProfile:
     @cached_property
     def deviation(self) -> float:
         """Deviation of the lag by the linear model of the likeliest, s."""
-        lags = self.best.lags
-        return max(
-            math.sqrt(float(lags @ self.best.stages[-1].covariance @ lags)), _LEAST_DEVIATION
-        )
+        return max(math.sqrt(self.best.lag_variance), _LEAST_DEVIATION)
 
     @cached_property
     def log_likelihood(self) -> _Array:
@@ -239,16 +246,16 @@ class LagProfile:
             log = np.logaddexp(log, -0.5 * (rise + ((LAGS - one.lag) / self.deviation) ** 2))
         return np.asarray(log)
 
-    def along(self, number: Callable[[PosteriorFit], float], slope: float) -> _Array:
-        """Return a number of each fit at each of `LAGS`.
+    def along(self, numbers: Mapping[PosteriorFit, float], slope: float) -> _Array:
+        """Return a number that each fit has at each of `LAGS`.
 
         Beyond the fits it has the `slope` that the linear model of the likeliest tells.
         """
-        values = np.interp(LAGS, self.lags, [number(one) for one in self.fits])
+        values = np.interp(LAGS, self.lags, [numbers[one] for one in self.fits])
         values += slope * np.minimum(LAGS - self.lags[0], 0.0)
         values += slope * np.maximum(LAGS - self.lags[-1], 0.0)
         for one in self.apart:
-            values[np.abs(LAGS - one.lag) < _NEAR * self.deviation] = number(one)
+            values[np.abs(LAGS - one.lag) < _NEAR * self.deviation] = numbers[one]
         return values
 
 

@@ -179,6 +179,17 @@ class PosteriorFit:
         """One for each free coordinate that is part of the lag, shape (p,), else zero."""
         return np.array([float(name in TIMING) for name in self.names])
 
+    @property
+    def lag_variance(self) -> float:
+        """Variance of the lag by the linear model at the end, s²."""
+        return max(float(self.lags @ self.stages[-1].covariance @ self.lags), 0.0)
+
+    @property
+    def along_lag(self) -> NDArray[np.float64]:
+        """Change of each free coordinate for a lag of a second, by the same, shape (p,)."""
+        along = self.stages[-1].covariance @ self.lags
+        return np.asarray(along / max(float(self.lags @ along), np.finfo(float).tiny))
+
 
 def lag_of(at: Coordinates) -> float:
     """Return the time by which the stem is seen late in all, s."""

@@ -430,10 +430,8 @@ class _Search:
 
     def held(self, best: PosteriorFit, at: Coordinates, lag: float) -> PosteriorFit:
         """Fit with one lag, s, from where the linear model of the best fit leads from a place."""
-        along = best.stages[-1].covariance @ best.lags
-        along /= max(float(best.lags @ along), np.finfo(float).tiny)
         start = dict(at)
-        for name, share in zip(best.names, along.tolist(), strict=True):
+        for name, share in zip(best.names, best.along_lag.tolist(), strict=True):
             there = start[name] + share * (lag - lag_of(at))
             least = _LEAST_LEFT * abs(start[name]) if name in MAIN[:3] else -math.inf
             start[name] = max(there, least, BOUNDS.get(name, -math.inf))
@@ -564,8 +562,7 @@ def _fall_at_low_speed(fit: PosteriorFit) -> float:
 
 def _first_step(fit: PosteriorFit) -> float:
     """Return the deviation of the lag by the linear model, s, within what a step may be."""
-    variance = float(fit.lags @ fit.stages[-1].covariance @ fit.lags)
-    return float(np.clip(math.sqrt(max(variance, 0.0)), _LEAST_STEP, _LARGEST_STEP))
+    return float(np.clip(math.sqrt(fit.lag_variance), _LEAST_STEP, _LARGEST_STEP))
 
 
 def _delay(fit: PosteriorFit) -> float:
