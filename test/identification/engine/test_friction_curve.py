@@ -136,6 +136,18 @@ class TestRecovery:
             assert steady < one.value + one.half_width
             assert one.value < packing.static_friction + packing.viscous_friction * curve.speed[-1]
 
+    @pytest.mark.parametrize("seed", range(4))
+    def test_a_fall_beyond_the_speeds_of_the_record_stays_open(self, seed):
+        """The stem goes 2 mm/s at most: what looks like F_c holds most of the slip force."""
+        valve, packing = drawn(seed)
+        static = 1.6 * packing.coulomb_friction
+        packing = replace(packing, static_friction=static, stribeck_velocity=4e-3)
+        place = 0.5 + (np.sin(0.7 * TIME) + 0.5 * np.sin(1.9 * TIME + 1.0)) * 1.2e-3 / valve.travel
+        numbers = curve_numbers(friction_curves(moved(valve, packing, place), valve, NO_LAG))
+        for name in ("coulomb_friction", "viscous_friction"):
+            truth = getattr(packing, name)
+            assert abs(numbers[name].value - truth) <= numbers[name].half_width, name
+
     def test_known_parameters_stay_out(self):
         valve, packing = drawn(1)
         fixed = {name: getattr(packing, name) for name in ("viscous_friction", "spring_constant")}
@@ -155,7 +167,7 @@ class TestRecovery:
         for seed in range(10):
             record = moved(valve, packing, WAVES, 1e-3, seed=seed)
             curve = friction_curves(record, valve, NO_LAG)[0]
-            found.append(curve.numbers["viscous_friction"].value / packing.viscous_friction - 1)
+            found.append(curve.law["viscous_friction"] / packing.viscous_friction - 1)
             plain.append(attenuated(record, valve, curve) / packing.viscous_friction - 1)
         assert np.mean(plain) < -3 * np.std(plain)
         assert abs(np.mean(found)) < 3 * np.std(found) / np.sqrt(10)
@@ -461,24 +473,6 @@ class TestCheckOfASimulation:
             slip_force,
         )["coulomb_friction"]
         assert (found.value, found.half_width) == (expected[0], pytest.approx(expected[1]))
-
-    @pytest.mark.parametrize(
-        ("balanced", "is_exact", "half_width"),
-        [(112.0, True, 3.0), (112.0, False, math.hypot(3.0, 12.0)), (103.0, False, 3.0)],
-        ids=["noise alone", "contradicted", "agreed with"],
-    )
-    def test_a_fit_that_is_not_quite_noise_yields_to_a_force_balance(
-        self, balanced, is_exact, half_width
-    ):
-        """The simulation knows F_v, yet something else is in its residual."""
-        viscous = {"viscous_friction": number(1000.0, 100.0)}
-        found = checked_by_curve(
-            {"coulomb_friction": number(100.0, 3.0), **viscous},
-            {"coulomb_friction": number(balanced, 2.0), **viscous},
-            follows=True,
-            is_exact=is_exact,
-        )["coulomb_friction"]
-        assert (found.value, found.half_width) == (100.0, pytest.approx(half_width))
 
     def test_a_slow_sensor_that_the_simulation_excludes_is_no_rival(self):
         ours = replace(number(100.0, 9.0), rival=100.0)

@@ -44,9 +44,8 @@ from valve_friction_ros.identification.engine.sliding_averages import (
 )
 from valve_friction_ros.identification.engine.weights import inflation
 from valve_friction_ros.identification.trust.sliding import SPEED_EXPONENT
-from valve_friction_ros.identification.trust.uncertainty import (
-    MEDIAN_MAGNITUDE,
-)
+from valve_friction_ros.identification.trust.uncertainty import MEDIAN_MAGNITUDE
+from valve_friction_ros.identification.trust.verdict import FALL_SPEED
 from valve_friction_ros.identification.units import SLIDING
 from valve_friction_ros.model.valve import Valve
 
@@ -59,6 +58,14 @@ of freedom. The packings of the paper have 0.3 to 0.8."""
 SECOND_ORDER = 0.025
 """Time, s, whose square halved, times k, bounds what a lag does beyond a shift."""
 
+_FALLS = np.geomspace(3e-4, FALL_SPEED, 8)
+_SLIPPING, _SLIP, _SLIP_SPREAD = 0.5, 0.35, 0.2
+"""Stribeck speeds of packings, m/s, each as likely as the next; the share of packings that slip,
+and mean and deviation of their slip force over the friction: F_s is 1.15 to 2 times F_c.
+
+A record that is slower does not show how far friction falls: these say it for dry and viscous
+friction."""
+
 _STRIBECK_SPEEDS = np.geomspace(0.04, 0.6, 8)
 _STRIBECK_WORTH = 1.05
 _STRIBECK_OPEN = 1.08
@@ -67,6 +74,9 @@ and up to which residual others stay open."""
 
 _OF_NO_LAW = (SLIDING, "spring_constant", "spring_preload", "mass")
 """Numbers that no law of friction over speed takes part in."""
+
+_SPLIT = ("coulomb_friction", "viscous_friction")
+"""What the friction is made of once it has ceased to fall with speed."""
 
 _CONSERVATIVE = ("spring_constant", "spring_preload", "curvature", "cubic", "drift", "mass")
 """Terms of the force that are not friction."""
@@ -128,11 +138,12 @@ class _Solved(NamedTuple):
 
 
 class _Choice(NamedTuple):
-    """Probability of a choice of imperfections, and the solution with these alone."""
+    """Probability of a choice of imperfections or of a fall, and the solution with it alone."""
 
     probability: float
     estimate: _Array
     covariance: _Array
+    scores: _Array
 
 
 def _inverse(information: _Array) -> _Array:
@@ -263,12 +274,7 @@ class Regression:
         if not self.lag.is_known:
             expected[len(self.names)] = -lag * scale[len(self.names)]
         weight = np.ones(taken.size) if weight is None else weight
-        even, odd = columns
-        cross = even.T @ (odd * weight[:, None])
-        own = 0.5 * (even.T @ (even * weight[:, None]) + odd.T @ (odd * weight[:, None]))
-        right = 0.5 * (even.T @ (weight * forces[1]) + odd.T @ (weight * forces[0]))
-        shared, right = _shared(own, 0.5 * (cross + cross.T), right, self.independent)
-        information, right = shared / variance, right / variance
+        information, right = self.normal_equations(forces, columns, weight, variance)
         covariance = _inverse(information + np.diag(precision))
         estimate = covariance @ (right + precision * expected)
         residual = [force - one @ estimate for force, one in zip(forces, columns, strict=True)]
@@ -285,6 +291,17 @@ class Regression:
             information,
             right,
         )
+
+    def normal_equations(
+        self, forces: list[_Array], columns: list[_Array], weight: _Array, variance: float
+    ) -> tuple[_Array, _Array]:
+        """Return the information about the coefficients and the right-hand side of both halves."""
+        even, odd = columns
+        cross = even.T @ (odd * weight[:, None])
+        own = 0.5 * (even.T @ (even * weight[:, None]) + odd.T @ (odd * weight[:, None]))
+        right = 0.5 * (even.T @ (weight * forces[1]) + odd.T @ (weight * forces[0]))
+        shared, right = _shared(own, 0.5 * (cross + cross.T), right, self.independent)
+        return shared / variance, right / variance
 
     @property
     def least_variance(self) -> float:
@@ -366,7 +383,7 @@ class Regression:
             solved = self.solve(self.later(solved), stribeck, variance * inflated, solved.weight)
         return Posterior(self, solved, variance * inflated, inflated, stribeck, near)
 
-    def choices(self, solved: _Solved) -> list[_Choice]:
+    def choices(self, solved: _Solved, scores: _Array) -> list[_Choice]:
         """Return the solution for each probable choice of the imperfections that the plant has.
 
         Those of `_RARE` that it does not have keep a prior so narrow that they hardly matter.
@@ -382,11 +399,68 @@ class Regression:
         log_evidence = np.sum(drawn * estimate, axis=1) - np.linalg.slogdet(whole)[1]
         log_evidence += np.sum(np.log(precision[:, rare]), axis=1)
         log_odds = math.log(_HOW_RARE / (1.0 - _HOW_RARE)) * np.sum(chosen, axis=1)
-        log = 0.5 * log_evidence + log_odds
-        probability = np.exp(log - np.max(log))
-        kept = np.flatnonzero(probability > _LEAST_PROBABLE)
-        probability /= np.sum(probability[kept])
-        return [_Choice(float(probability[at]), estimate[at], covariance[at]) for at in kept]
+        return _probable(
+            0.5 * log_evidence + log_odds,
+            [_Choice(1.0, *one, scores) for one in zip(estimate, covariance, strict=True)],
+        )
+
+    def falls(self, solved: _Solved, variance: float) -> list[_Choice]:
+        """Return the solution for each probable fall of the friction with speed, none among them.
+
+        What a record leaves open of it, dry and viscous friction leave open.
+        """
+        dry = self.names.index("coulomb_friction") if "coulomb_friction" in self.names else -1
+        count = len(self.names) + (not self.lag.is_known)
+        plain = [one[:, :count] for one in solved.columns]
+        forces = [
+            residual + columns @ solved.estimate
+            for residual, columns in zip(solved.residual, solved.columns, strict=True)
+        ]
+        weight = solved.weight
+        found: list[_Choice] = []
+        logs: list[float] = []
+        for stribeck in (0.0, *_FALLS.tolist()) if dry >= 0 else (0.0,):
+            columns, precision = plain, solved.precision[:count]
+            expected = solved.expected[:count]
+            if stribeck:
+                slip = self.slip(stribeck) * self.friction
+                columns = [np.column_stack([one, slip]) for one in plain]
+                precision = np.append(precision, _SLIP_SPREAD**-2.0)
+                expected = np.append(expected, _SLIP)
+            information, right = self.normal_equations(forces, columns, weight, variance)
+            whole = information + np.diag(precision)
+            covariance = _inverse(whole)
+            estimate = covariance @ (right + precision * expected)
+            left = [force - one @ estimate for force, one in zip(forces, columns, strict=True)]
+            log = -float(weight @ (0.5 * (left[0] + left[1])) ** 2) / variance
+            log -= float(precision @ (estimate - expected) ** 2)
+            log += np.sum(np.log(precision[count:])) - np.linalg.slogdet(whole)[1]
+            frictions = [dry, -1] if stribeck else [dry]
+            sure = estimate[frictions] / np.sqrt(np.diag(covariance)[frictions])
+            positive = float(np.prod(normal(sure)))
+            scores = self.scores(left, columns, weight, variance)
+            found.append(_Choice(1.0, estimate, covariance, scores))
+            share = _SLIPPING / _FALLS.size if stribeck else 1.0 - _SLIPPING
+            logs.append(0.5 * log + math.log(share * max(positive, 1e-10)))
+        return _probable(np.array(logs), found)
+
+    def scores(
+        self, residual: list[_Array], columns: list[_Array], weight: _Array, variance: float
+    ) -> _Array:
+        """Return the information by the scatter of the strokes."""
+        blocks = np.array_split(np.arange(weight.size), int(np.clip(self.strokes, *_BLOCKS)))
+        scores = np.stack(
+            [
+                0.5
+                / variance
+                * sum(
+                    (weight[block] * residual[1 - half][block]) @ columns[half][block]
+                    for half in (0, 1)
+                )
+                for block in blocks
+            ]
+        )
+        return np.asarray((scores.T @ scores) * len(blocks) / (len(blocks) - 1))
 
     def definition(self, name: str, solved: _Solved) -> float:
         """Deviation of a number by what it means where it is not one, as in `reported_numbers`.
@@ -499,6 +573,20 @@ class Regression:
         )
 
 
+def _probable(logs: _Array, choices: Sequence[_Choice]) -> list[_Choice]:
+    """Return the choices that are probable, by the logarithms of their probabilities."""
+    probability = np.exp(logs - np.max(logs))
+    kept = np.flatnonzero(probability > _LEAST_PROBABLE)
+    probability /= np.sum(probability[kept])
+    return [choices[at]._replace(probability=float(probability[at])) for at in kept]
+
+
+def _median(values: _Array, shares: _Array) -> float:
+    """Return the value that half of the shares lie below, which no improbable one moves."""
+    order = np.argsort(values)
+    return float(values[order[np.searchsorted(np.cumsum(shares[order]), 0.5 * np.sum(shares))]])
+
+
 def _kept_by(work: Work, place: _Array, age: _Array) -> dict[str, float]:
     """Return the work per distance that each term of a force of unit size keeps, by its name."""
     terms = {
@@ -553,22 +641,11 @@ class Posterior:
         self.inflation, self.stribeck, self.near = inflation, stribeck, near
         covariance, count = solved.covariance, solved.weight.size
         blocks = np.array_split(np.arange(count), int(np.clip(regression.strokes, *_BLOCKS)))
-        scores = np.stack(
-            [
-                0.5
-                / variance
-                * sum(
-                    (solved.weight[block] * solved.residual[1 - half][block])
-                    @ solved.columns[half][block]
-                    for half in (0, 1)
-                )
-                for block in blocks
-            ]
-        )
-        self.scores = (scores.T @ scores) * len(blocks) / (len(blocks) - 1)
+        self.scores = regression.scores(solved.residual, solved.columns, solved.weight, variance)
         self.scatter = covariance @ self.scores @ covariance
-        self.all = [_Choice(1.0, solved.estimate, covariance)]
-        self.choices = regression.choices(solved)
+        self.all = [_Choice(1.0, solved.estimate, covariance, self.scores)]
+        self.falls = regression.falls(solved, variance)
+        self.choices = regression.choices(solved, self.scores)
         velocity = regression.averages.mean_velocity[regression.averages.taken]
         left = velocity * (solved.residual[0] + solved.residual[1]) / 2.0
         of_blocks = np.array([np.sum(left[block]) for block in blocks]) / np.sum(np.abs(velocity))
@@ -641,9 +718,11 @@ class Posterior:
 
     def _given_lag(self, gradient: _Array, choice: _Choice) -> tuple[float, float, float]:
         """Return a number, its slope over the lag's coefficient, and its deviation at that lag."""
-        index, along = len(self.regression.names), choice.covariance @ gradient
+        index, size = len(self.regression.names), choice.estimate.size
+        gradient = np.pad(gradient[:size], (0, max(size - gradient.size, 0)))
+        along = choice.covariance @ gradient
         value, variance = float(gradient @ choice.estimate), float(gradient @ along)
-        widened = float(along @ self.scores @ along) / max(variance, np.finfo(float).tiny)
+        widened = float(along @ choice.scores @ along) / max(variance, np.finfo(float).tiny)
         factor = float(np.clip(widened, 1.0, _LARGEST_SCATTER))
         if self.regression.lag.is_known:
             return value, 0.0, math.sqrt(max(factor * variance, np.finfo(float).tiny))
@@ -662,6 +741,8 @@ class Posterior:
         beside = self.regression.beside(name, self.lags)
         over_lags = self.of_record if name == SLIDING else self.probability
         choices = self.choices if name in _OF_NO_LAW else self.all
+        if name in _SPLIT:
+            choices = self.falls
         weights = np.outer([one.probability for one in choices], over_lags)
         values, record = np.empty_like(weights), np.empty_like(weights)
         for row, choice in enumerate(choices):
@@ -682,18 +763,18 @@ class Posterior:
             values = np.hstack([values, values - less + changed])
             weights = np.hstack([(1.0 - self.exchanged) * weights, self.exchanged * weights])
             record = np.hstack([record, record])
-        mean = float(np.sum(weights * values))
         shares = np.sum(weights, axis=1)
         means = np.sum(weights * values, axis=1) / shares
+        value = _median(means, shares) if name in _SPLIT else float(shares @ means)
         timing = 0.0
         if self.lags.size > 1:
             timing = math.sqrt(float(np.sum(weights * (values - means[:, None]) ** 2)))
-        open_ = float(np.sum(weights * record**2) + shares @ (means - mean) ** 2)
-        high = mixture_half_width(np.asarray(weights), values, record)
+        open_ = float(np.sum(weights * record**2) + shares @ (means - value) ** 2)
+        high = mixture_half_width(np.asarray(weights), values, record, value)
         timing = share_of_timing(high, math.sqrt(open_), timing)
         sources = {ROUNDING: rounding} if rounding > 0.0 else {}
         return Estimated(
-            mean, high, Budget(math.sqrt(open_), timing, sources, timing * self._unsaid()), rival
+            value, high, Budget(math.sqrt(open_), timing, sources, timing * self._unsaid()), rival
         )
 
     def _unsaid(self) -> float:

@@ -168,6 +168,17 @@ class FrictionCurve:
     correlation: Correlation | None = field(default=None, repr=False)
     posterior: Posterior | None = field(default=None, repr=False)
 
+    @property
+    def law(self) -> dict[str, float]:
+        """Coefficients of the likeliest law at the likeliest lag, SI units; none of strokes."""
+        if self.posterior is None:
+            return {}
+        solved = self.posterior.solved
+        values = self.posterior.regression.values(solved)
+        if self.stribeck_velocity:
+            values["slip_force"] = float(solved.estimate[-1] / solved.scale[-1])
+        return values
+
     def timed(self, log_likelihood: _Array) -> "FrictionCurve":
         """Return the same under another likelihood of `LAGS`, as simulated stems tell it."""
         if self.posterior is None or self.posterior.regression.lag.is_known:
@@ -447,7 +458,6 @@ def checked_by_curve(
     balanced: Mapping[str, Estimated],
     follows: bool,
     slip_force: float = 0.0,
-    is_exact: bool = True,
 ) -> dict[str, Estimated]:
     """Return the numbers of a simulation, checked and sharpened by those of the force balance.
 
@@ -455,8 +465,7 @@ def checked_by_curve(
     knows it better; spring, preload and sliding friction from the simulation where both exclude
     each other, as reversals and rests tell it a lag from a viscous friction; a part of their
     difference then widens the intervals of spring and preload, and those of F_c and F_v where the
-    simulation does not determine F_v; all of it where the residual is not quite noise (`is_exact`)
-    and both exclude each other. Where the stem does not follow, they come from the force
+    simulation does not determine F_v. Where the stem does not follow, they come from the force
     balance, and so do spring and preload where the simulation does not determine any friction: one
     that has a lag for it has another spring, too. What both divide between dry and viscous friction
     is uncertain by what they differ, and F_c also by a `slip_force`, N, of which no one knows at
@@ -475,8 +484,7 @@ def checked_by_curve(
         if not (follows and ours.half_width < width):
             result[name] = replace(theirs, half_width=width, rival=ours.rival)
             continue
-        is_contradicted = not (is_exact or _agree(ours, theirs))
-        share = 1.0 if is_contradicted else 0.0 if is_split else _PULL
+        share = 0.0 if is_split else _PULL
         result[name] = replace(ours, half_width=math.hypot(ours.half_width, share * apart))
     return result | _of_no_law(simulated, balanced, follows)
 

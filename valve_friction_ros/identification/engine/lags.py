@@ -120,19 +120,24 @@ def normal(deviations: _Array) -> _Array:
     return np.interp(deviations, _DEVIATIONS, _PROBABILITIES)
 
 
-def mixture_half_width(weights: _Array, values: _Array, deviations: _Array) -> float:
-    """Return half the width of the interval about the mean that holds `CONFIDENCE`.
+def mixture_half_width(
+    weights: _Array, values: _Array, deviations: _Array, centre: float | None = None
+) -> float:
+    """Return half the width of the interval about the centre that holds `CONFIDENCE`.
 
     Parameters
     ----------
     weights, values, deviations : ndarray of float, of one shape
         Of each normal distribution of a mixture; the weights add up to one.
+    centre : float, optional
+        By default the mean.
     """
-    mean = float(np.sum(weights * values))
-    spread = float(np.sum(weights * (deviations**2 + (values - mean) ** 2)))
+    if centre is None:
+        centre = float(np.sum(weights * values))
+    spread = float(np.sum(weights * (deviations**2 + (values - centre) ** 2)))
     low, high = 0.0, 20.0 * math.sqrt(spread)
     some = weights > _NEGLIGIBLE
-    weight, away = weights[some], mean - values[some]
+    weight, away = weights[some], centre - values[some]
     deviation = np.maximum(deviations[some], np.finfo(float).tiny)
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)

@@ -31,14 +31,13 @@ from valve_friction_ros.identification.engine.friction_curve import (
 )
 from valve_friction_ros.identification.engine.imperfections import Profile
 from valve_friction_ros.identification.engine.intervals import (
-    NOISE_LIKE,
     NOT_QUITE,
     Estimated,
     NumbersAt,
     estimated,
     has_tried_lags,
 )
-from valve_friction_ros.identification.engine.lags import LagPrior, LagProfile
+from valve_friction_ros.identification.engine.lags import LARGEST_LAG, LagPrior, LagProfile
 from valve_friction_ros.identification.engine.numbers import (
     ASYMMETRY,
     found_sizes,
@@ -331,12 +330,12 @@ def _of_simulation(
             "valve, and their units, and that its stem reaches both ends of the travel; if the "
             "packing was changed during the record, clear the buffer and record again"
         )
-    follows = fit.inflation <= NOISE_LIKE and has_tried_lags(fits)
+    is_possible = abs(fit.lag) < LARGEST_LAG
+    follows = fit.inflation <= NOT_QUITE and has_tried_lags(fits) and is_possible
     if profile.has_imperfections:
-        is_exact = fit.inflation <= NOT_QUITE
-        if is_exact:
+        if follows:
             balanced = timed_numbers(curves, LagProfile.of(fits))
-        numbers = checked_by_curve(numbers, balanced, follows, fit.at["slip_force"], is_exact)
+        numbers = checked_by_curve(numbers, balanced, follows, fit.at["slip_force"])
         if "mass" in numbers and not prior.lag.is_known:
             numbers["mass"] = _beside_lags(numbers["mass"], fit.at["spring_constant"])
         misfit = fit_misfit(fit, numbers)

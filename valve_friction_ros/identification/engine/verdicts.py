@@ -17,7 +17,13 @@ import numpy as np
 
 from valve_friction_ros.identification.engine.friction_curve import FrictionCurve
 from valve_friction_ros.identification.engine.imperfections import Profile
-from valve_friction_ros.identification.engine.intervals import NOISE_LIKE, Estimated, has_tried_lags
+from valve_friction_ros.identification.engine.intervals import (
+    NOISE_LIKE,
+    NOT_QUITE,
+    Estimated,
+    has_tried_lags,
+)
+from valve_friction_ros.identification.engine.lags import LARGEST_LAG
 from valve_friction_ros.identification.engine.posterior_fit import PosteriorFit
 from valve_friction_ros.identification.engine.sentences import late_sensor, main_doubt, slips
 from valve_friction_ros.identification.settings import IdentificationSettings
@@ -50,6 +56,10 @@ _FAILED = 100.0
 """Inflation of the residual beyond which nothing that only the simulation knows is reported: ten
 times the noise."""
 
+_IMPOSSIBLE = (
+    "the best fit has the signals {:.0f} ms apart, which is not plausible: something else in the "
+    "motion passes for a lag"
+)
 _UNTRIED = "the search ended before it had tried other lags: bring a shorter record"
 _FURTHER, _BELOW_TOP = 0.35, 0.95
 """Half width over F_c of what it may fall further beyond the speeds of a slow record: of packings
@@ -64,6 +74,10 @@ _EXTRAPOLATED = "it lies outside the moves of the record, along a spring that is
 _UNCONFIRMED = "it follows from the forces alone: no simulated stem confirms it"
 _OF_THE_BALANCE = (SLIDING, "spring_constant", "spring_preload")
 """What the force balance of the sliding stem determines without a simulation."""
+
+_OF_SLIP = ("static_friction", "stribeck_velocity")
+"""What a simulation tells by the forces at which its stem leaves a rest, though its residual be
+more than noise of a sensor that is not quite white."""
 
 _NOISE_SHARE, _LEAST = 0.2, 2e-4
 """Shares of the stem's noise and of its range in the misfit that is tolerated on a bench.
@@ -134,7 +148,7 @@ def fit_verdicts(
         if slow and name == "coulomb_friction":
             width = math.hypot(width, _FURTHER * (1.0 - top / FALL_SPEED) * abs(one.value))
         reason = doubt or (slow if name in _BY_SPEED else "")
-        if split:
+        if split and not (name in _OF_SLIP and fit.inflation <= NOISE_LIKE):
             reason = "" if name in _OF_THE_BALANCE else reason or split
         scale = PRELOAD_SCALE * force_range if name == "spring_preload" else 0.0
         share = share_of(one.value, width, scale)
@@ -168,8 +182,10 @@ def _no_surer_than_its_spring(verdicts: dict[str, Parameter]) -> dict[str, Param
 
 def _split_doubt(fits: Sequence[PosteriorFit], misfit: Misfit, profile: Profile) -> str:
     """Return why only what the force balance determines too can be identified, or nothing."""
-    if fits[0].inflation > NOISE_LIKE and profile.has_imperfections:
+    if fits[0].inflation > NOT_QUITE and profile.has_imperfections:
         return _SPLIT_DOUBT.format(1e6 * misfit.systematic)
+    if abs(fits[0].lag) >= LARGEST_LAG:
+        return _IMPOSSIBLE.format(1e3 * abs(fits[0].lag))
     return "" if has_tried_lags(fits) else _UNTRIED
 
 
