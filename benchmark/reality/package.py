@@ -24,13 +24,7 @@ import numpy as np
 
 from benchmark.reality.records import Nominal, Record
 from valve_friction_ros import read_recording
-from valve_friction_ros.health import (
-    Baseline,
-    FrictionLimits,
-    Level,
-    StatusSignal,
-    diagnose_valve,
-)
+from valve_friction_ros.health import Baseline, FrictionLimits, Level, StatusSignal, diagnose_valve
 from valve_friction_ros.health.measured import Measured
 from valve_friction_ros.health.standstill import held_finding, held_numbers
 from valve_friction_ros.identification import (

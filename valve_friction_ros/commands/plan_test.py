@@ -21,10 +21,7 @@ from typing import Any
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from valve_friction_ros.commands.arguments.planning import (
-    frictions_from,
-    planned_settings,
-)
+from valve_friction_ros.commands.arguments.planning import frictions_from, planned_settings
 from valve_friction_ros.commands.console import OutputConsole, plain_console
 from valve_friction_ros.commands.process import ExitCode
 from valve_friction_ros.history import HistoryError
