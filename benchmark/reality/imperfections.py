@@ -21,8 +21,6 @@ from benchmark.reality.sensors import Instruments, Sensor
 from benchmark.reality.stamps import Stamping
 from benchmark.reality.valves import DrawnValve, log_uniform
 
-__all__ = ["IMPERFECTIONS", "Draft", "drawn_imperfections", "instruments_of"]
-
 _RATES = (100.0, 200.0, 500.0, 1000.0)
 _QUIET = (2e-4, 8e-4)
 """Noise of an ordinary sensor, share of its range."""

@@ -42,8 +42,6 @@ from valve_friction_ros.identification.refusal import LittleMotionError
 from valve_friction_ros.model import Recording, Valve
 from valve_friction_ros.streams import Arrivals, Kind, RecordBuffer
 
-__all__ = ["Answer", "Ends", "Number", "alarms", "ends", "identify", "identify_file", "is_baseline"]
-
 _WINDOW = 1e4
 """Longer than any record, s."""
 

@@ -21,8 +21,6 @@ from benchmark.reality.plants.kernel import GRID
 from benchmark.reality.plants.motion import Motion
 from benchmark.reality.stamps import Stamping, Times, sampling_times, stamped
 
-__all__ = ["Instruments", "Sensor", "Signal", "measured"]
-
 
 class Signal(NamedTuple):
     """One topic, or one column with its times.
