@@ -75,14 +75,6 @@ class Sensor:
     silence: float = 10.0
 
 
-def _pressure_sensor() -> Sensor:
-    return Sensor(noise=100.0, low=0.0, high=250e3)
-
-
-def _position_sensor() -> Sensor:
-    return Sensor(noise=10e-6, low=0.0, high=0.030)
-
-
 @dataclass(frozen=True)
 class Instruments:
     """Both sensors and their clocks.
@@ -97,8 +89,8 @@ class Instruments:
         Whether both are sampled at the same instants and lost together, as rows of a table.
     """
 
-    pressure: Sensor = field(default_factory=_pressure_sensor)
-    position: Sensor = field(default_factory=_position_sensor)
+    pressure: Sensor = field(default_factory=lambda: Sensor(100.0, 0.0, 250e3))
+    position: Sensor = field(default_factory=lambda: Sensor(10e-6, 0.0, 0.030))
     pressure_stamping: Stamping = field(default_factory=Stamping)
     position_stamping: Stamping = field(default_factory=Stamping)
     together: bool = True
