@@ -16,14 +16,16 @@ import os
 import statistics
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from benchmark.alarms import GROWTH, AlarmCounts, Diagnosed, diagnosed
+from benchmark.alarms import GROWTH, AlarmCounts, diagnosed
 from benchmark.bounds import (
     Bound,
     alarm_bounds,
@@ -108,20 +110,8 @@ def _seeds_of(case: Case, options: argparse.Namespace) -> int:
     return int(options.other_seeds)
 
 
-def _run(task: tuple[Case, int]) -> Outcome:
-    return run(*task)
-
-
-def _run_default(task: tuple[Case, int]) -> Outcome:
-    return run(*task, DEFAULT_METHOD)
-
-
-def _diagnosed(task: tuple[float, int]) -> Diagnosed:
-    return diagnosed(*task)
-
-
 def _in_parallel(
-    title: str, work: Callable[[Any], Any], tasks: Sequence[Any], jobs: int, console: Console
+    title: str, work: Callable[..., Any], tasks: Sequence[Any], jobs: int, console: Console
 ) -> list[Any]:
     """Do all tasks in `jobs` processes, in order, with a progress bar."""
     columns = (
@@ -131,8 +121,11 @@ def _in_parallel(
         TimeRemainingColumn(),
     )
     context = multiprocessing.get_context("spawn")
-    with Progress(*columns, console=console) as progress, context.Pool(jobs) as pool:
-        results: Iterable[Any] = pool.imap(work, tasks)
+    with (
+        Progress(*columns, console=console) as progress,
+        ProcessPoolExecutor(jobs, context) as pool,
+    ):
+        results: Iterable[Any] = pool.map(work, *zip(*tasks, strict=True))
         return list(progress.track(results, total=len(tasks), description=title))
 
 
@@ -153,7 +146,7 @@ def _coverage(results: Results, options: argparse.Namespace, console: Console) -
         for name in plants
         for seed in range(options.coverage)
     ]
-    results.coverage = _in_parallel("coverage", _run, tasks, options.jobs, console)
+    results.coverage = _in_parallel("coverage", run, tasks, options.jobs, console)
     for group in by_case(results.coverage).values():
         results.bounds += coverage_bounds(group)
 
@@ -165,7 +158,8 @@ def _default(results: Results, options: argparse.Namespace, console: Console) ->
         for excitation in EXCITATIONS
         for seed in range(options.other_seeds)
     ]
-    results.default = _in_parallel("default", _run_default, tasks, options.jobs, console)
+    work = partial(run, method=DEFAULT_METHOD)
+    results.default = _in_parallel("default", work, tasks, options.jobs, console)
     for group in by_case(results.default).values():
         results.bounds += default_bounds(group)
     console.print(cases_table(results.default))
@@ -174,7 +168,7 @@ def _default(results: Results, options: argparse.Namespace, console: Console) ->
 def _alarms(results: Results, options: argparse.Namespace, console: Console) -> None:
     unchanged = [(1.0, seed) for seed in range(options.alarms)]
     grown = [(GROWTH, _FIRST_GROWN_SEED + seed) for seed in range(2 * options.grown)]
-    found = _in_parallel("alarms", _diagnosed, [*unchanged, *grown], options.jobs, console)
+    found = _in_parallel("alarms", diagnosed, [*unchanged, *grown], options.jobs, console)
     healthy, tight = found[: len(unchanged)], found[len(unchanged) :]
     declared = ["high" in (tight[i].side, tight[i + 1].side) for i in range(0, len(tight), 2)]
     ratios = [one.ratio for one in healthy], [one.ratio for one in tight]
@@ -184,7 +178,7 @@ def _alarms(results: Results, options: argparse.Namespace, console: Console) -> 
 
 def _cases(results: Results, options: argparse.Namespace, console: Console) -> None:
     tasks = [(case, seed) for case in _all_cases() for seed in range(_seeds_of(case, options))]
-    results.outcomes = _in_parallel("cases", _run, tasks, options.jobs, console)
+    results.outcomes = _in_parallel("cases", run, tasks, options.jobs, console)
     for group in by_case(results.outcomes).values():
         results.bounds += case_bounds(group)
     console.print(cases_table(results.outcomes))

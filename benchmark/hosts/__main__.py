@@ -24,15 +24,7 @@ from typing import NamedTuple
 
 from benchmark.harness.postgres import PostgresServer, running_server
 from benchmark.harness.processes import Process, processor_seconds, resident_megabytes
-from benchmark.harness.rows import (
-    Row,
-    judged,
-    logged,
-    opened_console,
-    rows_table,
-    some,
-    write_json,
-)
+from benchmark.harness.rows import Row, judged, logged, opened_console, rows_table, some, write_json
 from benchmark.hosts.network import OUTSIDE, Host, Traffic, network
 
 _SERVER_PORT = 11811

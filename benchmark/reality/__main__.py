@@ -27,8 +27,6 @@ from benchmark.reality.records import Case
 from benchmark.reality.report import bounds, report
 from benchmark.reality.trial import Row, Task, rows_of, tried
 
-__all__ = ["main"]
-
 _PROCESSES = 2
 _PARTS = ("plain", "stickslip", "alarms")
 _RECORDS, _BRIEF = (50, 24, 12), (4, 2, 1)

@@ -21,8 +21,6 @@ from benchmark.reality.sensors import Instruments, Sensor
 from benchmark.reality.stamps import Stamping
 from benchmark.reality.valves import DrawnValve, log_uniform
 
-__all__ = ["IMPERFECTIONS", "Draft", "drawn_imperfections", "instruments_of"]
-
 _RATES = (100.0, 200.0, 500.0, 1000.0)
 _QUIET = (2e-4, 8e-4)
 """Noise of an ordinary sensor, share of its range."""
@@ -97,12 +95,8 @@ def instruments_of(valve: DrawnValve, random: _Random) -> Instruments:
     )
 
 
-def _sign(random: _Random) -> float:
-    return float(random.choice([-1.0, 1.0]))
-
-
 def _signed(random: _Random, low: float, high: float) -> float:
-    return _sign(random) * log_uniform(random, low, high)
+    return float(random.choice([-1.0, 1.0])) * log_uniform(random, low, high)
 
 
 def _noise(draft: Draft, random: _Random) -> Draft:
@@ -127,26 +121,14 @@ def _lag_of(which: str) -> Callable[[Draft, _Random], Draft]:
     return lambda draft, random: draft.sensor(which, lag=log_uniform(random, 5e-3, 80e-3))
 
 
-def _volume(draft: Draft, random: _Random) -> Draft:
-    return draft.body(volume_lag=log_uniform(random, 5e-3, 80e-3))
-
-
 def _offset(draft: Draft, random: _Random) -> Draft:
     late = replace(draft.instruments.position_stamping, offset=_signed(random, 5e-3, 60e-3))
     return replace(draft, instruments=replace(draft.instruments, position_stamping=late))
 
 
-def _rate(draft: Draft, random: _Random) -> Draft:
-    return draft.clocks(draft.instruments.together, rate=log_uniform(random, 20.0, 80.0))
-
-
 def _jitter(draft: Draft, random: _Random) -> Draft:
     shares = random.uniform(0.05, 0.3), draft.period * random.uniform(0.02, 0.15)
     return draft.clocks(False, jitter=shares[0], stamp_error=shares[1])
-
-
-def _cut(draft: Draft, random: _Random) -> Draft:
-    return draft.clocks(False, jitter=0.2, resolution=draft.period * random.uniform(0.2, 1.0))
 
 
 def _drops(draft: Draft, random: _Random) -> Draft:
@@ -174,20 +156,8 @@ def _drift(draft: Draft, random: _Random) -> Draft:
     return draft.sensor("pressure", drift=share * (sensor.high - sensor.low) / 60.0)
 
 
-def _asymmetric(draft: Draft, random: _Random) -> Draft:
-    return draft.friction(asymmetry=_signed(random, 0.02, 0.12))
-
-
 def _trend(random: _Random) -> Trend:
     return Trend(_signed(random, 0.03, 0.2), random.uniform(-0.6, 0.6))
-
-
-def _along(draft: Draft, random: _Random) -> Draft:
-    return draft.friction(along_travel=_trend(random))
-
-
-def _in_record(draft: Draft, random: _Random) -> Draft:
-    return draft.friction(in_record=_trend(random))
 
 
 def _curved(draft: Draft, random: _Random) -> Draft:
@@ -227,18 +197,22 @@ IMPERFECTIONS: Mapping[str, Callable[[Draft, np.random.Generator], Draft]] = Map
         "quantised": _bits,
         "stem lag": _lag_of("position"),
         "pressure lag": _lag_of("pressure"),
-        "volume": _volume,
+        "volume": lambda draft, random: draft.body(volume_lag=log_uniform(random, 5e-3, 80e-3)),
         "clock offset": _offset,
-        "low rate": _rate,
+        "low rate": lambda draft, random: draft.clocks(
+            draft.instruments.together, rate=log_uniform(random, 20.0, 80.0)
+        ),
         "jitter": _jitter,
-        "cut stamps": _cut,
+        "cut stamps": lambda draft, random: draft.clocks(
+            False, jitter=0.2, resolution=draft.period * random.uniform(0.2, 1.0)
+        ),
         "drops": _drops,
         "held": _held,
         "dead band": _dead_band,
         "zero drift": _drift,
-        "asymmetric": _asymmetric,
-        "along travel": _along,
-        "in record": _in_record,
+        "asymmetric": lambda draft, random: draft.friction(asymmetry=_signed(random, 0.02, 0.12)),
+        "along travel": lambda draft, random: draft.friction(along_travel=_trend(random)),
+        "in record": lambda draft, random: draft.friction(in_record=_trend(random)),
         "curved": _curved,
         "stops": _stops,
         "LuGre": _bending(Law.LUGRE),

@@ -16,8 +16,6 @@ from scipy.signal import savgol_filter
 
 from benchmark.reality.records import Record
 
-__all__ = ["sliding_friction"]
-
 _WINDOW = 0.15
 _SURELY = 0.2
 """Length of the filter, s, and share of the top speed above which a sample surely slides."""

@@ -18,8 +18,6 @@ from numpy.typing import NDArray
 from benchmark.reality.plants.kernel import GRID, Loop
 from benchmark.reality.valves import DrawnValve, log_uniform
 
-__all__ = ["Drive", "Kind", "drawn_drive"]
-
 
 class Kind(Enum):
     """What the valve does in a record."""

@@ -24,13 +24,7 @@ import numpy as np
 
 from benchmark.reality.records import Nominal, Record
 from valve_friction_ros import read_recording
-from valve_friction_ros.health import (
-    Baseline,
-    FrictionLimits,
-    Level,
-    StatusSignal,
-    diagnose_valve,
-)
+from valve_friction_ros.health import Baseline, FrictionLimits, Level, StatusSignal, diagnose_valve
 from valve_friction_ros.health.measured import Measured
 from valve_friction_ros.health.standstill import held_finding, held_numbers
 from valve_friction_ros.identification import (
@@ -47,8 +41,6 @@ from valve_friction_ros.identification.engine.search import _Search, search
 from valve_friction_ros.identification.refusal import LittleMotionError
 from valve_friction_ros.model import Recording, Valve
 from valve_friction_ros.streams import Arrivals, Kind, RecordBuffer
-
-__all__ = ["Answer", "Ends", "Number", "alarms", "ends", "identify", "identify_file", "is_baseline"]
 
 _WINDOW = 1e4
 """Longer than any record, s."""

@@ -17,8 +17,6 @@ from typing import NamedTuple
 
 from benchmark.reality import package
 
-__all__ = ["EMPS", "RealRow", "real_rows"]
-
 EMPS = {"coulomb_friction": 20.3935, "viscous_friction": 203.5034}
 """IDIM-LS values of the data set's authors: N, and N·s/m."""
 

@@ -28,8 +28,6 @@ from benchmark.reality.sensors import Signal, measured
 from benchmark.reality.truth import TrueValue, truth_of
 from benchmark.reality.valves import drawn_cylinder, drawn_valve
 
-__all__ = ["Case", "Nominal", "Record", "load", "make_record", "save"]
-
 _TRIES = 100
 _LEAST_MOVE = 0.008
 """A record must hold moves both ways of so much of the travel; hunting, so many reversals of

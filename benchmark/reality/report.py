@@ -19,8 +19,6 @@ from typing import NamedTuple
 from benchmark.reality.real import RealRow
 from benchmark.reality.trial import CHANGES, SLIDING, Row
 
-__all__ = ["Bound", "Judged", "bounds", "in_mode", "is_right", "is_useful", "judged", "report"]
-
 _WIDEST_ERROR, _LEAST_ERROR = 3.0, 0.02
 """An identified number is wrong if it is off by more half widths, and by more than this share."""
 

@@ -21,8 +21,6 @@ from benchmark.reality.plants.kernel import GRID
 from benchmark.reality.plants.motion import Motion
 from benchmark.reality.stamps import Stamping, Times, sampling_times, stamped
 
-__all__ = ["Instruments", "Sensor", "Signal", "measured"]
-
 
 class Signal(NamedTuple):
     """One topic, or one column with its times.
@@ -77,14 +75,6 @@ class Sensor:
     silence: float = 10.0
 
 
-def _pressure_sensor() -> Sensor:
-    return Sensor(noise=100.0, low=0.0, high=250e3)
-
-
-def _position_sensor() -> Sensor:
-    return Sensor(noise=10e-6, low=0.0, high=0.030)
-
-
 @dataclass(frozen=True)
 class Instruments:
     """Both sensors and their clocks.
@@ -99,8 +89,8 @@ class Instruments:
         Whether both are sampled at the same instants and lost together, as rows of a table.
     """
 
-    pressure: Sensor = field(default_factory=_pressure_sensor)
-    position: Sensor = field(default_factory=_position_sensor)
+    pressure: Sensor = field(default_factory=lambda: Sensor(100.0, 0.0, 250e3))
+    position: Sensor = field(default_factory=lambda: Sensor(10e-6, 0.0, 0.030))
     pressure_stamping: Stamping = field(default_factory=Stamping)
     position_stamping: Stamping = field(default_factory=Stamping)
     together: bool = True

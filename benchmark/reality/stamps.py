@@ -15,8 +15,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Stamping", "Times", "sampling_times", "stamped"]
-
 
 @dataclass(frozen=True)
 class Stamping:

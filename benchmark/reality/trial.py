@@ -29,8 +29,6 @@ from benchmark.reality.package import Answer, Number
 from benchmark.reality.records import Case, Record, make_record, save
 from benchmark.reality.truth import TrueValue
 
-__all__ = ["CHANGES", "SLIDING", "Row", "Task", "rows_of", "tried"]
-
 SLIDING = "sliding_friction"
 
 CHANGES = (1.0, 1.5, 2.0, 0.45)

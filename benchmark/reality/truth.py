@@ -20,8 +20,6 @@ from benchmark.reality.plants.motion import Motion
 from benchmark.reality.plants.parameters import Body, Friction, Law, Plant, Trend
 from benchmark.reality.sensors import Instruments
 
-__all__ = ["NAMES", "TrueValue", "truth_of"]
-
 NAMES = (
     "mass",
     "viscous_friction",

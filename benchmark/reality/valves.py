@@ -16,8 +16,6 @@ import numpy as np
 
 from benchmark.reality.plants import Body, Friction, Plant
 
-__all__ = ["DrawnValve", "drawn_cylinder", "drawn_valve", "log_uniform"]
-
 _AREAS = (0.004, 0.12)
 _TRAVELS = (0.008, 0.08)
 _SPRINGS = (2e4, 2e6)

@@ -67,10 +67,6 @@ def noisy_record(
     return noise.applied_to(Recording(PERIOD, driving, stem.position))
 
 
-def _say_nothing(_: str) -> None:
-    pass
-
-
 @dataclass(frozen=True)
 class Settings:
     """How thoroughly the parts measure.
@@ -87,7 +83,7 @@ class Settings:
 
     repeats: int = 5
     seconds: float = 60.0
-    say: Callable[[str], None] = field(default=_say_nothing, repr=False)
+    say: Callable[[str], None] = field(default=lambda _: None, repr=False)
 
 
 def _processor_time() -> float:

@@ -69,19 +69,39 @@ def printed(call):
 
 
 @pytest.fixture
-def refusal(call):
-    """Function of arguments: the one line on stderr that goes with exit code 2."""
+def refused(command):
+    """Function of a sub-command and arguments: its one line on stderr, with exit code 2."""
 
-    def refusal(*arguments):
-        code, out, err = call(*arguments)
+    def refused(name, *arguments):
+        code, out, err = command(name, *arguments)
         assert (code, out) == (2, "")
         line, rest = err.split("\n", 1)
         assert rest == ""
-        command, _, message = line.partition(": ")
-        assert command == "valve_friction identify"
+        speaker, _, message = line.partition(": ")
+        assert speaker == f"valve_friction {name}"
         return message
 
-    return refusal
+    return refused
+
+
+@pytest.fixture
+def refusal(refused):
+    """Function of arguments: the one line with which `identify` refuses them."""
+    return partial(refused, "identify")
+
+
+@pytest.fixture(name="run")
+def history_run(file, command, capsys):
+    """Function of arguments of `history` on the file of the tests: exit code, stdout, stderr."""
+
+    def call(*arguments, path=file):
+        try:
+            return command("history", path, *arguments)
+        except SystemExit as end:
+            code = end.code
+        return (code, *capsys.readouterr())
+
+    return call
 
 
 @pytest.fixture(scope="session")

@@ -44,21 +44,6 @@ def file(tmp_path_factory):
     return history.path
 
 
-@pytest.fixture
-def run(file, command, capsys):
-    """Run the command on the file; return exit code, output and errors."""
-
-    def call(*arguments, path=file):
-        try:
-            return command("history", path, *arguments)
-        except SystemExit as end:
-            code = end.code
-        captured = capsys.readouterr()
-        return code, captured.out, captured.err
-
-    return call
-
-
 def told(run, *arguments):
     code, output, errors = run("--json", *arguments)
     assert (code, errors) == (0, "")

@@ -45,19 +45,6 @@ def file(tmp_path_factory):
     return history.path
 
 
-@pytest.fixture
-def run(file, command, capsys):
-    def call(*arguments):
-        try:
-            return command("history", file, *arguments)
-        except SystemExit as end:
-            code = end.code
-        captured = capsys.readouterr()
-        return code, captured.out, captured.err
-
-    return call
-
-
 def test_below_the_list(run, monkeypatch):
     monkeypatch.setenv("COLUMNS", "160")
     code, output, errors = run()

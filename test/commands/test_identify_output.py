@@ -32,10 +32,7 @@ from valve_friction_ros.identification import (
     identify_bench,
     published_estimate,
 )
-from valve_friction_ros.model import (
-    BENCH_VALVE,
-    LOW_FRICTION,
-)
+from valve_friction_ros.model import BENCH_VALVE, LOW_FRICTION
 
 SETTINGS = IdentificationSettings(assumed_mass=1.6)  # of the valve file
 PNG = b"\x89PNG\r\n\x1a\n"

@@ -14,11 +14,7 @@ import math
 import numpy as np
 import pytest
 
-from valve_friction_ros.model import (
-    BENCH_VALVE,
-    Recording,
-    simulate,
-)
+from valve_friction_ros.model import BENCH_VALVE, Recording, simulate
 
 
 class TestBadRecords:

@@ -16,7 +16,6 @@ import re
 import shutil
 import struct
 import subprocess
-from functools import partial
 
 import numpy as np
 import pytest
@@ -58,17 +57,6 @@ SECTIONS = [
 ]
 _NAMES = ("chromium", "chromium-browser", "google-chrome")
 BROWSERS = [path for path in map(shutil.which, _NAMES) if path is not None]
-
-
-@pytest.fixture
-def call(command):
-    """Function of arguments: exit code, stdout and stderr of `identify`."""
-    return partial(command, "identify")
-
-
-@pytest.fixture
-def quick_csv(write_csv, columns_of, quick_record):
-    return write_csv(columns_of(quick_record))
 
 
 @pytest.fixture

@@ -51,11 +51,6 @@ def other_csv(write_csv, columns_of, other_record):
 
 
 @pytest.fixture
-def valve_options(bench_yaml):
-    return ["--valve", str(bench_yaml)]
-
-
-@pytest.fixture
 def estimate(tmp_path):
     """Function of values by name: a file as `identify --json` writes it."""
 
@@ -84,17 +79,9 @@ def call(command):
 
 
 @pytest.fixture
-def refused(call):
+def refused(refused):
     """Function of arguments: the one line with which the command refuses."""
-
-    def refused(*arguments):
-        code, out, err = call(*arguments)
-        assert (code, out) == (2, "")
-        assert err.startswith("valve_friction validate: ")
-        assert err.count("\n") == 1
-        return err
-
-    return refused
+    return partial(refused, "validate")
 
 
 @pytest.mark.parametrize(
@@ -109,7 +96,7 @@ def test_a_model_validates_on_a_record_it_has_not_seen(
     write_csv,
     columns_of,
     other_csv,
-    valve_options,
+    bench_options,
     tmp_path,
     command,
     call,
@@ -117,14 +104,14 @@ def test_a_model_validates_on_a_record_it_has_not_seen(
     """A record that suits the method is identified, and the slow sine simulated with the model."""
     record = simulated(benches["high"], excitation, duration)
     path = write_csv(columns_of(record), "identified.csv")
-    code, printed, _ = command("identify", path, *valve_options, "--method", method, "--json")
+    code, printed, _ = command("identify", path, *bench_options, "--method", method, "--json")
     assert code == 0
     estimate = tmp_path / "estimate.json"
     estimate.write_text(printed)
     answer = json.loads(estimate.read_text())
     assert answer["method"] == method
     assert answer["parameters"]["coulomb_friction"]["value"] == pytest.approx(606.0, rel=0.02)
-    code, out, err = call(other_csv, *valve_options, "--estimate", estimate, "--json")
+    code, out, err = call(other_csv, *bench_options, "--estimate", estimate, "--json")
     assert (code, err) == (0, "")
     found = json.loads(out)
     assert found["fit"] > 0.995
@@ -133,9 +120,9 @@ def test_a_model_validates_on_a_record_it_has_not_seen(
 
 
 class TestAnswer:
-    def test_the_numbers_of_the_library(self, call, estimate, other_csv, valve_options):
+    def test_the_numbers_of_the_library(self, call, estimate, other_csv, bench_options):
         path = estimate(static_friction=606.0, mass=1.75)
-        code, out, _ = call(other_csv, *valve_options, "--estimate", path, "--json")
+        code, out, _ = call(other_csv, *bench_options, "--estimate", path, "--json")
         assert code == 0
         answer = json.loads(out, parse_constant=pytest.fail)
         record = Recording(1 / RATE, *self.columns(other_csv))
@@ -154,8 +141,8 @@ class TestAnswer:
         table = np.loadtxt(path, delimiter=",", skiprows=1)
         return table[:, 2], table[:, 1]
 
-    def test_for_people(self, call, estimate, other_csv, valve_options):
-        _, out, _ = call(other_csv, *valve_options, "--estimate", estimate())
+    def test_for_people(self, call, estimate, other_csv, bench_options):
+        _, out, _ = call(other_csv, *bench_options, "--estimate", estimate())
         lines = out.splitlines()
         assert lines[0].startswith("fit 99.")
         assert lines[0].endswith("1 − ‖y − ŷ‖ / ‖y − ȳ‖)")
@@ -177,11 +164,11 @@ class TestAnswer:
         ],
     )
     def test_a_poor_fit(
-        self, call, estimate, other_csv, valve_options, friction, options, code, least
+        self, call, estimate, other_csv, bench_options, friction, options, code, least
     ):
         """It is said in words, and by the exit code if that is asked for."""
         path = estimate(coulomb_friction=friction)
-        options = [*valve_options, "--estimate", path, *options]
+        options = [*bench_options, "--estimate", path, *options]
         found, out, err = call(other_csv, *options)
         assert (found, err) == (code, "")
         said = [line for line in out.splitlines() if line.startswith("poor: ")]
@@ -197,16 +184,16 @@ class TestAnswer:
             call(other_csv, "--estimate", estimate(), "--fail-below", given)
         assert f"{given!r} is not a percentage, such as 90; see --help" in capsys.readouterr().err
 
-    def test_a_picture(self, call, estimate, other_csv, valve_options, tmp_path):
+    def test_a_picture(self, call, estimate, other_csv, bench_options, tmp_path):
         path = tmp_path / "validation.png"
-        code, *_ = call(other_csv, *valve_options, "--estimate", estimate(), "--plot", path)
+        code, *_ = call(other_csv, *bench_options, "--estimate", estimate(), "--plot", path)
         assert code == 0
         assert matplotlib.image.imread(path).shape[0] > 500
 
-    def test_as_a_process(self, estimate, other_csv, valve_options):
+    def test_as_a_process(self, estimate, other_csv, bench_options):
         command = [sys.executable, "-m", "valve_friction_ros", "validate"]
         done = subprocess.run(
-            [*command, other_csv, *valve_options, "--estimate", estimate()],
+            [*command, other_csv, *bench_options, "--estimate", estimate()],
             capture_output=True,
             text=True,
             timeout=60,
@@ -218,9 +205,9 @@ class TestAnswer:
 
 class TestRefusals:
     @pytest.mark.parametrize("name", ["coulomb_friction", "spring_constant", "spring_preload"])
-    def test_no_model_without_these(self, refused, estimate, other_csv, valve_options, name):
+    def test_no_model_without_these(self, refused, estimate, other_csv, bench_options, name):
         path = estimate(**{name: None})
-        message = refused(other_csv, *valve_options, "--estimate", path)
+        message = refused(other_csv, *bench_options, "--estimate", path)
         assert f"{path}: {name} was not identified, and a model needs it" in message
 
     @pytest.mark.parametrize(
@@ -235,28 +222,28 @@ class TestRefusals:
             ('{"parameters": {"weight": {"value": 1}}}', "unknown parameter 'weight'"),
         ],
     )
-    def test_what_is_no_estimate(self, refused, tmp_path, other_csv, valve_options, content, cause):
+    def test_what_is_no_estimate(self, refused, tmp_path, other_csv, bench_options, content, cause):
         path = tmp_path / "bad.json"
         path.write_text(content)
-        message = refused(other_csv, *valve_options, "--estimate", path)
+        message = refused(other_csv, *bench_options, "--estimate", path)
         assert f"{path}: " in message
         assert cause in message
 
-    def test_no_file(self, refused, tmp_path, other_csv, valve_options, estimate):
+    def test_no_file(self, refused, tmp_path, other_csv, bench_options, estimate):
         path = tmp_path / "none"
-        assert f"{path}: cannot be read" in refused(other_csv, *valve_options, "--estimate", path)
-        assert str(path) in refused(path, *valve_options, "--estimate", estimate())
+        assert f"{path}: cannot be read" in refused(other_csv, *bench_options, "--estimate", path)
+        assert str(path) in refused(path, *bench_options, "--estimate", estimate())
 
-    def test_impossible_value(self, refused, estimate, other_csv, valve_options):
+    def test_impossible_value(self, refused, estimate, other_csv, bench_options):
         path = estimate(coulomb_friction=-3.0)
         assert f"{path}: coulomb_friction must not be negative" in refused(
-            other_csv, *valve_options, "--estimate", path
+            other_csv, *bench_options, "--estimate", path
         )
 
-    def test_no_motion(self, refused, write_csv, columns_of, estimate, valve_options):
+    def test_no_motion(self, refused, write_csv, columns_of, estimate, bench_options):
         still = Recording(0.01, np.full(500, 1e5), np.full(500, 0.01))
         path = write_csv(columns_of(still))
-        message = refused(path, *valve_options, "--estimate", estimate())
+        message = refused(path, *bench_options, "--estimate", estimate())
         assert f"{path}: the stem did not move" in message
 
     def test_no_valve(self, refused, estimate, other_csv):

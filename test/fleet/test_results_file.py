@@ -32,7 +32,6 @@ from valve_friction_ros.fleet.rows import (
     PAGE,
     WIDTH,
     error_cells,
-    key_cells,
     ranked,
     reaches,
     report_name,
@@ -66,8 +65,9 @@ os.kill(os.getpid(), signal.SIGKILL)
 
 def rows_of(number, valves, text):
     """The rows of a recording: what is in them must not disturb how they are told apart."""
-    keys = key_cells(f"{number}, {text}", f"c{number}", "s", valves)
-    return [{**error_cells(f"/v{n}", text, Path("x")), **keys} for n in range(valves)]
+    keys = {"recording": f"{number}, {text}", "content": f"c{number}", "settings": "s"}
+    refused = (error_cells(f"/v{n}", text, Path("x")) for n in range(valves))
+    return [{**cells, **keys, "valves": valves} for cells in refused]
 
 
 def recordings_in(results):

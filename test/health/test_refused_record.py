@@ -26,18 +26,8 @@ from valve_friction_ros.health import (
 )
 from valve_friction_ros.health.refused_record import numbers_of_refused
 from valve_friction_ros.health.stem_reach import stem_reach
-from valve_friction_ros.identification import (
-    IdentificationSettings,
-    RefusalError,
-    identify,
-)
-from valve_friction_ros.model import (
-    BENCH_VALVE,
-    HIGH_FRICTION,
-    Recording,
-    SensorNoise,
-    simulate,
-)
+from valve_friction_ros.identification import IdentificationSettings, RefusalError, identify
+from valve_friction_ros.model import BENCH_VALVE, HIGH_FRICTION, Recording, SensorNoise, simulate
 from valve_friction_ros.streams import RecordBuffer, rows_arrived
 
 TRAVEL = BENCH_VALVE.travel

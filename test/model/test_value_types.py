@@ -27,11 +27,7 @@ from valve_friction_ros.model import (
     StemState,
     Valve,
 )
-from valve_friction_ros.model.checks import (
-    require_finite,
-    require_non_negative,
-    require_positive,
-)
+from valve_friction_ros.model.checks import require_finite, require_non_negative, require_positive
 
 NOT_NUMBERS = ["1.0", True, None, [1.0], {}]
 NOT_FINITE = [math.nan, math.inf, -math.inf]

@@ -18,6 +18,7 @@ from typing import Any
 
 from rich.table import Table
 
+from valve_friction_ros.commands.arguments import require_outputs
 from valve_friction_ros.commands.arguments.declared import EARLIEST, LATEST
 from valve_friction_ros.commands.arguments.identification import chosen_valves, has_failed
 from valve_friction_ros.commands.console import plain_console
@@ -385,16 +386,6 @@ def _trend_lines(trend: Trend | None) -> list[str]:
 REFUSALS = (HistoryError,)
 
 
-def _require_files(options: argparse.Namespace) -> None:
-    """Refuse files that cannot be written, before long work is done for them."""
-    if options.csv is not None and not options.csv.parent.is_dir():
-        raise ValueError(f"{options.csv}: there is no folder {options.csv.parent}")
-    if options.plot is not None:
-        from valve_friction_ros import figures  # noqa: PLC0415 - slow to import
-
-        figures.require_picture_file(options.plot)
-
-
 def _usages(options: argparse.Namespace) -> list[tuple[KeptValve, ValveUsage]]:
     if options.plot is not None or options.fail_on is not None:
         raise ValueError("--usage: neither --plot nor --fail-on belong to it")
@@ -434,7 +425,7 @@ def _span(options: argparse.Namespace) -> tuple[int, int]:
 
 def run(options: argparse.Namespace) -> int:
     """Print what was kept of the chosen valves, and write the files asked for."""
-    _require_files(options)
+    require_outputs(options.csv, picture=options.plot)
     if options.usage:
         return _print_usages(options)
     file = History(options.file)

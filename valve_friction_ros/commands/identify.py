@@ -17,6 +17,7 @@ from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from valve_friction_ros.commands.arguments import require_outputs
 from valve_friction_ros.commands.arguments.identification import (
     has_failed,
     identification_settings,
@@ -106,12 +107,8 @@ def baseline_from(options: argparse.Namespace) -> Baseline | None:
     return Baseline(friction, 0.0 if width is None else width)
 
 
-def _require_files(options: argparse.Namespace) -> None:
-    """Refuse files that cannot be written; the ValueError names the file and the cause."""
-    if options.plot is not None:
-        from valve_friction_ros.figures import require_picture_file  # noqa: PLC0415 - slow to import
-
-        require_picture_file(options.plot)
+def _require_report(options: argparse.Namespace) -> None:
+    """Refuse a report that cannot be written; the ValueError names the file and the cause."""
     if options.report is not None:
         from valve_friction_ros.reports import require_report_file  # noqa: PLC0415 - slow to import
 
@@ -258,7 +255,8 @@ def run(options: argparse.Namespace) -> int:
     limits = survey_limits(options, description)
     method = method_named(method_name(options, description.settings))
     baseline = baseline_from(options)
-    _require_files(options)
+    require_outputs(picture=options.plot)
+    _require_report(options)
     healthy: Recording | None = None
     if options.baseline_recording is not None:
         baseline, healthy = _of_healthy(options, valve, method, settings, reading)

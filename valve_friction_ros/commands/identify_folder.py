@@ -66,7 +66,6 @@ from valve_friction_ros.fleet.results_file import (
 from valve_friction_ros.fleet.rows import (
     Cell,
     error_cells,
-    key_cells,
     ranked,
     reaches,
     with_reports_written,
@@ -401,8 +400,9 @@ def _identify(
     ) as progress:
         task = progress.add_task("", total=len(plans))
         for plan, rows in finished(plans, share_out, stop):
-            keys = key_cells(plan.name, plan.content, plan.settings, len(rows))
-            results.append([{**row, **keys} for row in rows])
+            # By these a later run knows what was done.
+            keys = {"recording": plan.name, "content": plan.content, "settings": plan.settings}
+            results.append([{**row, **keys, "valves": len(rows)} for row in rows])
             progress.advance(task)
             for row in rows:
                 filing: Any = row.get(FILING)

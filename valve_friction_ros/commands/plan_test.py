@@ -21,10 +21,8 @@ from typing import Any
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from valve_friction_ros.commands.arguments.planning import (
-    frictions_from,
-    planned_settings,
-)
+from valve_friction_ros.commands.arguments import require_outputs
+from valve_friction_ros.commands.arguments.planning import frictions_from, planned_settings
 from valve_friction_ros.commands.console import OutputConsole, plain_console
 from valve_friction_ros.commands.process import ExitCode
 from valve_friction_ros.history import HistoryError
@@ -228,20 +226,6 @@ def _parameters(values: dict[str, Any]) -> str:
 REFUSALS = (RefusalError, HistoryError)
 
 
-def _require_files(options: argparse.Namespace) -> None:
-    """Refuse files that cannot be written, before the work begins."""
-    output: Path = options.output
-    for path in filter(None, (output, options.table, options.form)):
-        if path.exists() and not options.replace:
-            raise ValueError(f"{path}: it is there: give another name, or --replace")
-        if not path.parent.is_dir():
-            raise ValueError(f"{path}: there is no folder {path.parent}")
-    if options.figure is not None:
-        from valve_friction_ros import figures  # noqa: PLC0415 - slow to import
-
-        figures.require_picture_file(options.figure)
-
-
 def _planned(options: argparse.Namespace) -> StrokePlan:
     """Read the files, and search with a bar on a terminal."""
     described = read_valve_file(options.valve, options.valve_name)
@@ -276,7 +260,11 @@ def _planned(options: argparse.Namespace) -> StrokePlan:
 
 def run(options: argparse.Namespace) -> int:
     """Plan, write the files, and print what to expect."""
-    _require_files(options)
+    files: list[Path] = [*filter(None, (options.output, options.table, options.form))]
+    for path in files:
+        if path.exists() and not options.replace:
+            raise ValueError(f"{path}: it is there: give another name, or --replace")
+    require_outputs(*files, picture=options.figure)
     plan = _planned(options)
     signal = span(options.signal_range, PRESSURE) if options.signal_range else None
     texts = {}

@@ -21,10 +21,7 @@ import scipy
 from numpy.typing import NDArray
 
 from valve_friction_ros.evidence.moves import Moves
-from valve_friction_ros.identification.trust.uncertainty import (
-    MEDIAN_MAGNITUDE,
-    student_quantile,
-)
+from valve_friction_ros.identification.trust.uncertainty import MEDIAN_MAGNITUDE, student_quantile
 
 BLOCK = 600.0
 """Least time, s, of moves whose errors are taken as correlated."""

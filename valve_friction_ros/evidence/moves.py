@@ -315,13 +315,11 @@ def _signals(pressure: Samples, position: Samples, valve: Valve, newest: int) ->
     pauses = np.array([])
     limits = [_GAP_PERIODS * float(np.median(np.diff(t))) for t in (time, force_time) if t.size > 1]
     if len(limits) == 2:
-        gaps = [
-            t[:-1][np.diff(t) > limit] for t, limit in zip((time, force_time), limits, strict=True)
+        pairs = [
+            np.column_stack((t[:-1], t[1:]))[np.diff(t) > limit]
+            for t, limit in zip((time, force_time), limits, strict=True)
         ]
-        ends = [
-            t[1:][np.diff(t) > limit] for t, limit in zip((time, force_time), limits, strict=True)
-        ]
-        pauses = np.column_stack((np.concatenate(gaps), np.concatenate(ends)))
+        pauses = np.concatenate(pairs)
     force_time, values = _fresh(force_time, pressure.values)
     force = np.asarray(valve.actuator_force(values), dtype=np.float64)
     return _Signals(origin, time, position.values[inside], force_time, force, pauses)

@@ -87,8 +87,7 @@ def draw_history(
     if history.trend is not None and history.trend.is_significant:
         _draw_trend(axes, history.trend)
     axes.set_ylabel(f"{_what(history)} [N]")
-    axes.grid(alpha=0.3)
-    axes.spines[["top", "right"]].set_visible(False)
+    dress((axes,))
 
 
 def _mark(axes: Axes, time: int, style: str, label: str) -> None:
@@ -111,16 +110,18 @@ def entitle(axes: Axes, history: ValveHistory) -> None:
     axes.set_title(drift, loc="right", fontsize="medium", color=_TREND)
 
 
+def _tick_dates(axes: Axes, most: int, least: int = 5) -> None:
+    locator = AutoDateLocator(minticks=least, maxticks=most)  # type: ignore[no-untyped-call]
+    axes.xaxis.set_major_locator(locator)
+    axes.xaxis.set_major_formatter(ConciseDateFormatter(locator))  # type: ignore[no-untyped-call]
+
+
 def set_dates(
     axes: Axes, span: tuple[int, int], histories: Sequence[ValveHistory], most_ticks: int = 9
 ) -> None:
     """Label the time axis of some histories, with their first and last day."""
     axes.set_xlim(*_dates(span))
-    locator = AutoDateLocator(maxticks=most_ticks)  # type: ignore[no-untyped-call]
-    axes.xaxis.set_major_locator(locator)
-    axes.xaxis.set_major_formatter(
-        ConciseDateFormatter(locator)  # type: ignore[no-untyped-call]
-    )
+    _tick_dates(axes, most_ticks)
     times = [entry.time for history in histories for entry in history.entries]
     first, last = _dates([min(times), max(times)]).astype("datetime64[D]")
     axes.set_xlabel(f"time [UTC]; identified from {first} to {last}")
@@ -268,8 +269,7 @@ def draw_usage(axes: Axes, usage: ValveUsage, span: tuple[int, int]) -> None:
         axes.axvline(begin, color=_RENEWED, ls="-.", lw=1.5, label="packing renewed")
     axes.set_ylim(bottom=0.0)
     axes.set_ylabel("travel [m/day]")
-    axes.grid(alpha=0.3)
-    axes.spines[["top", "right"]].set_visible(False)
+    dress((axes,))
 
 
 MOST_PANELS = 12
@@ -384,9 +384,7 @@ def usage_figure(usage: ValveUsage, is_narrow: bool = False) -> Figure:
     first = min(dates[0], dates[-1] - (_FEWEST_DAYS - 1))
     half = np.timedelta64(12, "h")
     days.set_xlim(first - half, dates[-1] + half)
-    locator = AutoDateLocator(minticks=2, maxticks=5)  # type: ignore[no-untyped-call]
-    days.xaxis.set_major_locator(locator)
-    days.xaxis.set_major_formatter(ConciseDateFormatter(locator))  # type: ignore[no-untyped-call]
+    _tick_dates(days, 5, least=2)
     days.set_xlabel("day [UTC]")
     days.set_ylabel("travelled distance [m]")
     dress((places, days))

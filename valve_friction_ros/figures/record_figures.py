@@ -16,7 +16,6 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from valve_friction_ros.figures.panels import (
     COLOURS,
@@ -301,7 +300,7 @@ def noise_figures(comparison: StemComparison) -> tuple[Figure, Figure]:
     histogram.set_ylabel("samples")
     correlation = comparison.autocorrelation(min(_LAGS, residual.size))
     lags = np.arange(correlation.size) * comparison.sample_period
-    chance = _chance(residual)
+    chance = 1.96 / math.sqrt(residual.size)  # holds 95 % of the autocorrelations of white noise
     axes.plot(lags, correlation, color=COLOURS[1], lw=1.2)
     axes.axhspan(-chance, chance, color="black", alpha=0.15, lw=0)
     axes.set_ylim(-1.05, 1.05)
@@ -309,8 +308,3 @@ def noise_figures(comparison: StemComparison) -> tuple[Figure, Figure]:
     axes.set_ylabel("autocorrelation [-]")
     dress((histogram, axes))
     return figures[0], figures[1]
-
-
-def _chance(residual: NDArray[np.float64]) -> float:
-    """Return the bound within which 95 % of the autocorrelations of white noise lie."""
-    return 1.96 / math.sqrt(residual.size)

@@ -25,15 +25,7 @@ from typing import Any, NamedTuple
 from urllib.parse import quote
 
 from valve_friction_ros import __version__
-from valve_friction_ros.fleet.rows import (
-    COLUMNS,
-    HEIGHT,
-    PICTURE,
-    WIDTH,
-    Cell,
-    ranked,
-    status_of,
-)
+from valve_friction_ros.fleet.rows import COLUMNS, HEIGHT, PICTURE, WIDTH, Cell, ranked, status_of
 from valve_friction_ros.outside_text import csv_text
 from valve_friction_ros.page_template import page_environment
 from valve_friction_ros.records.files import write_whole
@@ -136,7 +128,8 @@ class ResultsFile:
     ) -> None:
         """Write the outputs and close the database."""
         try:
-            self._write_outputs()
+            for output, write in self._outputs.items():
+                write_whole(output, write(self._rows(), output, self._zone).encode())
         finally:
             self._connection.close()
 
@@ -154,10 +147,6 @@ class ResultsFile:
             query = f"SELECT {', '.join(_KEPT)} FROM result ORDER BY rowid"  # noqa: S608 - own names
             for cells in self._connection.execute(query):
                 yield dict(zip(_KEPT, cells, strict=True))
-
-    def _write_outputs(self) -> None:
-        for output, write in self._outputs.items():
-            write_whole(output, write(self._rows(), output, self._zone).encode())
 
     def entries(self) -> Iterator[RecordingRows]:
         """Go through the recordings."""

@@ -144,20 +144,6 @@ def error_cells(valve: str, reason: str, path: Path) -> Mapping[str, Cell]:
     return {"valve": _one_line(valve), "error": _one_line(reason)}
 
 
-def key_cells(recording: str, content: str, settings: str, valves: int) -> Mapping[str, Cell]:
-    """Fill the cells by which a later run knows what was done.
-
-    `content` and `settings` are fingerprints of the files and of the options, `valves` is the
-    number of rows of this recording.
-    """
-    return {
-        "recording": recording,
-        "content": content,
-        "settings": settings,
-        "valves": valves,
-    }
-
-
 class RowStatus(NamedTuple):
     """The diagnosis of a row in one word, and the colour class that goes with it."""
 

@@ -37,13 +37,7 @@ from valve_friction_ros.health.by_evidence import (
     why_not_compared,
 )
 from valve_friction_ros.health.common_factor import drive_scale, explains, qualified
-from valve_friction_ros.health.comparison import (
-    Comparison,
-    Ratio,
-    carried,
-    compared,
-    friction_name,
-)
+from valve_friction_ros.health.comparison import Comparison, Ratio, carried, compared, friction_name
 from valve_friction_ros.health.diagnosis import (
     Diagnosis,
     EarlierEstimate,
@@ -68,11 +62,7 @@ from valve_friction_ros.health.known_numbers import KnownNumbers
 from valve_friction_ros.health.levels import Finding, Level, StatusSignal, by_severity
 from valve_friction_ros.health.measured import DatedNumber, Measured
 from valve_friction_ros.health.refused_record import RefusedRecordError
-from valve_friction_ros.health.standstill import (
-    Standstill,
-    StandstillCounter,
-    standstill_finding,
-)
+from valve_friction_ros.health.standstill import Standstill, StandstillCounter, standstill_finding
 from valve_friction_ros.health.survey import Survey, SurveyLimits, surveyed
 from valve_friction_ros.health.valve_changes import valve_changes
 from valve_friction_ros.health.valve_diagnosis import (
@@ -82,11 +72,7 @@ from valve_friction_ros.health.valve_diagnosis import (
     diagnose_valve,
 )
 from valve_friction_ros.health.valve_limits import ValveLimits
-from valve_friction_ros.health.valve_numbers import (
-    OF_ONE_RESULT,
-    comparable_numbers,
-    valve_numbers,
-)
+from valve_friction_ros.health.valve_numbers import OF_ONE_RESULT, comparable_numbers, valve_numbers
 
 __all__ = [
     "OF_ONE_RESULT",

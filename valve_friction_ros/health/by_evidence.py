@@ -23,12 +23,7 @@ from valve_friction_ros.health.baseline import (
     SlidingFriction,
 )
 from valve_friction_ros.health.comparison import Ratio, compared
-from valve_friction_ros.health.diagnosis import (
-    Diagnosis,
-    FrictionLimits,
-    FrictionState,
-    against,
-)
+from valve_friction_ros.health.diagnosis import Diagnosis, FrictionLimits, FrictionState, against
 from valve_friction_ros.identification import SLIDING, RefusalError
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.wording import Code, Statement, percentage, said

@@ -51,7 +51,7 @@ def stop_findings(
     moved = _moved(now, healthy, bound)
     changes = list(moved.values())
     if len(changes) == len(_SIDES) and changes[0].agrees_with(changes[1]):
-        yield _finding(said(Code.STOPS_MOVED_ALIKE, change=changes[0].interval), *moved)
+        yield _maintenance(said(Code.STOPS_MOVED_ALIKE, change=changes[0].interval), *moved)
         return
     sensor = "BOTH" if len(moved) == len(_SIDES) else "EITHER"
     if any(name in now and name in healthy for name in _SIDES.keys() - moved.keys()):
@@ -61,7 +61,7 @@ def stop_findings(
         is_lost = side * change.value < 0
         code = Code.TRAVEL_LOST if is_lost else Code.STOP_MOVED_OUTWARD
         statement = said(code, stop=name, change=change.interval, sensor=sensor)
-        yield _finding(statement, name if is_lost or name in now else end)
+        yield _maintenance(statement, name if is_lost or name in now else end)
 
 
 def _moved(
@@ -84,10 +84,6 @@ def _moved(
             if change.times(side).beyond(-bound, float("inf")):
                 moved[name] = change
     return moved
-
-
-def _finding(statement: Statement, *numbers: str) -> Finding:
-    return Finding(Level.WARN, StatusSignal.MAINTENANCE_REQUIRED, statement, numbers)
 
 
 class ValveDiagnosis(NamedTuple):
@@ -185,10 +181,6 @@ def diagnose_numbers(
         *_noises(case, has_scaled=factor is not None),
         *_lag(case),
     )
-
-
-_BOTH = 2
-"""Stops of a valve."""
 
 
 @dataclass(frozen=True)
@@ -323,7 +315,7 @@ def _preload_causes(case: _Case, shift: Measured) -> tuple[Statement, ...]:
     bound = case.limits.stop_change * case.valve.travel
     with_balance = [one.agrees_with(moved) for one in stops]
     have_moved = all(with_balance) and all(one.beyond(-bound, bound) for one in stops)
-    if have_moved and len(stops) == _BOTH:
+    if have_moved and len(stops) == len(_SIDES):
         return (said(Code.POSITION_ZERO, reading=moved.value, stops="BOTH"),)
     drive = case.valve.driven_by
     zero_of_drive = case.valve.actuator_drive(shift.value) - case.valve.actuator_drive(0.0)

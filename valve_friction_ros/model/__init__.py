@@ -14,10 +14,7 @@ from typing import TYPE_CHECKING
 from valve_friction_ros.on_demand import names_on_demand
 
 if TYPE_CHECKING:
-    from valve_friction_ros.model.drive import (
-        DEFAULT_LAG as DEFAULT_LAG,
-        Drive as Drive,
-    )
+    from valve_friction_ros.model.drive import DEFAULT_LAG as DEFAULT_LAG, Drive as Drive
     from valve_friction_ros.model.excitations import (
         BENCH_VALVE as BENCH_VALVE,
         GRAPHITE_PACKING as GRAPHITE_PACKING,
@@ -36,12 +33,8 @@ if TYPE_CHECKING:
         SensorNoise as SensorNoise,
         converter_response as converter_response,
     )
-    from valve_friction_ros.model.karnopp_parameters import (
-        KarnoppParameters as KarnoppParameters,
-    )
-    from valve_friction_ros.model.recording import (
-        Recording as Recording,
-    )
+    from valve_friction_ros.model.karnopp_parameters import KarnoppParameters as KarnoppParameters
+    from valve_friction_ros.model.recording import Recording as Recording
     from valve_friction_ros.model.simulation import (
         StemState as StemState,
         Trajectory as Trajectory,
@@ -50,8 +43,6 @@ if TYPE_CHECKING:
         compile_kernels as compile_kernels,
         simulate as simulate,
     )
-    from valve_friction_ros.model.valve import (
-        Valve as Valve,
-    )
+    from valve_friction_ros.model.valve import Valve as Valve
 else:
     __getattr__ = names_on_demand(__name__)

@@ -14,11 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from valve_friction_ros.model.checks import (
-    require_finite,
-    require_non_negative,
-    require_positive,
-)
+from valve_friction_ros.model.checks import require_finite, require_non_negative, require_positive
 
 
 @dataclass(frozen=True)

@@ -25,13 +25,7 @@ from valve_friction_ros.model.compiled import compiled, compiled_products
 from valve_friction_ros.model.dynamics import Dynamics, friction_fall, sliding_friction
 from valve_friction_ros.model.linear_motion import impulse_response, self_convolution
 from valve_friction_ros.model.stem_motion import STRIBECK_STEP, advance_stem
-from valve_friction_ros.model.stem_tangent import (
-    Tangent,
-    begin_step,
-    face,
-    keep,
-    set_anew,
-)
+from valve_friction_ros.model.stem_tangent import Tangent, begin_step, face, keep, set_anew
 
 _FALLEN = 6.0
 """Speed over the Stribeck velocity above which the remaining fall is below rounding: e⁻³⁶."""

@@ -124,10 +124,6 @@ def moved(
     return SimulatedTest(period, pressure, simulate(valve, parameters, pressure, period))
 
 
-def _breakaways(velocity: NDArray[np.float64]) -> int:
-    return int(np.count_nonzero((velocity[1:] != 0) & (velocity[:-1] == 0)))
-
-
 def forecast(
     motion: SimulatedTest,
     valve: Valve,
@@ -167,7 +163,7 @@ def forecast(
         widths,
         (float(stem.position.min()), float(stem.position.max())),
         float(np.max(np.abs(stem.velocity))),
-        _breakaways(stem.velocity),
+        int(np.count_nonzero((stem.velocity[1:] != 0) & (stem.velocity[:-1] == 0))),
         refusal,
     )
 
@@ -354,10 +350,6 @@ class _Search:
         return best
 
 
-def _told_nobody(share: float) -> None:
-    """Take a share of the work that nobody asked for."""
-
-
 def plan_test(
     valve: Valve,
     frictions: FrictionRange,
@@ -420,7 +412,7 @@ def plan_test(
     limits, conditions = limits or Limits(), conditions or Conditions()
     settings = settings or IdentificationSettings()
     found = _Search(valve, frictions, limits, conditions, settings, aim)
-    told = progress or _told_nobody
+    told = progress or (lambda _: None)
     test = found.test(found.best(told))
     assert test is not None  # noqa: S101 - it was simulated
     plan = StrokePlan(

@@ -21,20 +21,13 @@ import numpy as np
 import scipy
 
 import valve_friction_ros
-from valve_friction_ros.health import (
-    Level,
-    Measured,
-    compared,
-    dead_band,
-    valve_changes,
-)
+from valve_friction_ros.health import Level, Measured, compared, dead_band, valve_changes
 from valve_friction_ros.health.valve_changes import DIFFERENCES
 from valve_friction_ros.health.valve_numbers import comparable_numbers
 from valve_friction_ros.identification import (
     CALIBRATION,
     PARAMETER_UNITS,
     TIMING_UNCERTAINTY,
-    Parameter,
     Result,
     Verdict,
     two_digits,
@@ -334,7 +327,7 @@ def published_words(result: Result) -> str:
         f"it; it has no interval, and gives a number also where the record determines none. "
         f"{_how_else(result)}Where the two differ, use the value."
     )
-    outside = [one for one in beside if _differs(one)]
+    outside = [one for one in beside if 0 < one.half_width < abs(one.published - one.value)]
     if not outside:
         return f"{words} Here every published value that has an interval lies within it."
     told = "; ".join(
@@ -358,7 +351,3 @@ def _counts_with(result: Result) -> str:
     if "uncertainty_budget" not in result.evidence:
         return ""
     return " and at rest too, and counts with lags, noise and imperfections of the sensors"
-
-
-def _differs(one: Parameter) -> bool:
-    return one.half_width > 0 and abs(one.published - one.value) > one.half_width

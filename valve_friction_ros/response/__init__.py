@@ -9,29 +9,22 @@
 
 """The answer of a stem to its command in service: moves, deviation, hunting, blame; no ROS."""
 
-from valve_friction_ros.response.monitor import ResponseMonitor
-from valve_friction_ros.response.moves import Hunting, StepAnswer
-from valve_friction_ros.response.summary import (
-    FIGURES,
-    SIZES,
-    AnswerCause,
-    ResponseLimits,
-    ResponseSummary,
-    Spread,
-    response_findings,
-    summarised,
-)
+from typing import TYPE_CHECKING
 
-__all__ = [
-    "FIGURES",
-    "SIZES",
-    "AnswerCause",
-    "Hunting",
-    "ResponseLimits",
-    "ResponseMonitor",
-    "ResponseSummary",
-    "Spread",
-    "StepAnswer",
-    "response_findings",
-    "summarised",
-]
+from valve_friction_ros.on_demand import names_on_demand
+
+if TYPE_CHECKING:
+    from valve_friction_ros.response.monitor import ResponseMonitor as ResponseMonitor
+    from valve_friction_ros.response.moves import Hunting as Hunting, StepAnswer as StepAnswer
+    from valve_friction_ros.response.summary import (
+        FIGURES as FIGURES,
+        SIZES as SIZES,
+        AnswerCause as AnswerCause,
+        ResponseLimits as ResponseLimits,
+        ResponseSummary as ResponseSummary,
+        Spread as Spread,
+        response_findings as response_findings,
+        summarised as summarised,
+    )
+else:
+    __getattr__ = names_on_demand(__name__)

@@ -80,11 +80,6 @@ class CommandHolds:
         self._last = math.nan
         self._transit: _Transit | None = None
 
-    @property
-    def least_step(self) -> float:
-        """Smallest change that counts as a step."""
-        return 2 * self._gate
-
     def take(self, samples: Samples) -> list[CommandStep]:
         """Take samples, in the order of their stamps; return the changes that they end."""
         if not samples.stamps.size:
@@ -117,7 +112,7 @@ class CommandHolds:
         start, before, held, last = self._transit
         self._transit = None
         change = abs(self._level - before)
-        is_step = change >= self.least_step and abs(self._level - last) >= _JUMP_SHARE * change
+        is_step = change >= 2 * self._gate and abs(self._level - last) >= _JUMP_SHARE * change
         return [CommandStep(start, before, self._level, held, is_step)]
 
     def _take_one(self, stamp: int, value: float) -> None:

@@ -9,53 +9,40 @@
 
 """Streams of samples: what arrives, what is buffered, and the uniform record of both; no ROS."""
 
-from valve_friction_ros.streams.data_quality import (
-    DataFault,
-    DataQuality,
-    FaultKind,
-    LossCounter,
-    Losses,
-)
-from valve_friction_ros.streams.record_buffer import (
-    Intake,
-    RecordBuffer,
-    SampleFault,
-    Signal,
-    Snapshot,
-)
-from valve_friction_ros.streams.samples import (
-    COLUMNS,
-    DAY,
-    Arrivals,
-    Kind,
-    Samples,
-    nanoseconds,
-    rows_arrived,
-    uniform_recording,
-)
-from valve_friction_ros.wording import utc, utc_day, utc_minute, utc_second
+from typing import TYPE_CHECKING
 
-__all__ = [
-    "COLUMNS",
-    "DAY",
-    "Arrivals",
-    "DataFault",
-    "DataQuality",
-    "FaultKind",
-    "Intake",
-    "Kind",
-    "LossCounter",
-    "Losses",
-    "RecordBuffer",
-    "SampleFault",
-    "Samples",
-    "Signal",
-    "Snapshot",
-    "nanoseconds",
-    "rows_arrived",
-    "uniform_recording",
-    "utc",
-    "utc_day",
-    "utc_minute",
-    "utc_second",
-]
+from valve_friction_ros.on_demand import names_on_demand
+
+if TYPE_CHECKING:
+    from valve_friction_ros.streams.data_quality import (
+        DataFault as DataFault,
+        DataQuality as DataQuality,
+        FaultKind as FaultKind,
+        LossCounter as LossCounter,
+        Losses as Losses,
+    )
+    from valve_friction_ros.streams.record_buffer import (
+        Intake as Intake,
+        RecordBuffer as RecordBuffer,
+        SampleFault as SampleFault,
+        Signal as Signal,
+        Snapshot as Snapshot,
+    )
+    from valve_friction_ros.streams.samples import (
+        COLUMNS as COLUMNS,
+        DAY as DAY,
+        Arrivals as Arrivals,
+        Kind as Kind,
+        Samples as Samples,
+        nanoseconds as nanoseconds,
+        rows_arrived as rows_arrived,
+        uniform_recording as uniform_recording,
+    )
+    from valve_friction_ros.wording import (
+        utc as utc,
+        utc_day as utc_day,
+        utc_minute as utc_minute,
+        utc_second as utc_second,
+    )
+else:
+    __getattr__ = names_on_demand(__name__)

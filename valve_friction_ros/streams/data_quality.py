@@ -308,9 +308,6 @@ class _SignalQuality:
         self.advance = math.inf if self.stamp is None else max(stamp - self.stamp, 0) / 1e9
         self.stamp, self.stamp_time = stamp, time
 
-    def forget_stamp(self) -> None:
-        self.stamp, self.advance = None, math.inf
-
     def unusable(self, now: float) -> float:
         return math.inf if math.isnan(self.usable) else now - self.usable
 
@@ -446,7 +443,7 @@ class DataQuality:
     def forget_stamps(self) -> None:
         """Forget how stamps compare, as after a jump of the clock."""
         for quality in self._signals.values():
-            quality.forget_stamp()
+            quality.stamp, quality.advance = None, math.inf
         self._skew = _Lasting()
         self._clocks = {signal: _Lasting() for signal in Signal}
 

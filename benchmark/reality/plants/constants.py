@@ -15,8 +15,6 @@ import numpy as np
 
 from benchmark.reality.plants.parameters import Friction, Law, Plant
 
-__all__ = ["ELEMENTS", "STEPS", "Constants", "constants"]
-
 STEPS = {
     Law.MOREAU: 5e-6,
     Law.KARNOPP: 5e-6,

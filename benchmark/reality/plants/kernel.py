@@ -21,8 +21,6 @@ from benchmark.reality.plants.constants import ELEMENTS, Constants
 from benchmark.reality.plants.laws import INNER, SLIDING, V, X
 from benchmark.reality.plants.parameters import Law
 
-__all__ = ["GRID", "SUMS", "Loop", "runner_of", "stem_pull"]
-
 GRID = 1e-4
 """Time between two points of the simulated signals, s."""
 

@@ -23,8 +23,6 @@ from numpy.typing import NDArray
 
 from benchmark.reality.plants.constants import ELEMENTS, Constants
 
-__all__ = ["INNER", "SLIDING", "V", "X", "karnopp", "latched", "lugre", "maxwell", "moreau"]
-
 X, V, SLIDING, INNER = 0, 1, 2, 3
 """Places in the state: position, speed, broken away, and the first inner number."""
 

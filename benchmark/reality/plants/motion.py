@@ -18,8 +18,6 @@ from benchmark.reality.plants.constants import STEPS, constants
 from benchmark.reality.plants.kernel import GRID, SUMS, Loop, runner_of
 from benchmark.reality.plants.parameters import Plant
 
-__all__ = ["Motion", "move"]
-
 
 @dataclass(frozen=True, eq=False)
 class Motion:

@@ -14,8 +14,6 @@ from dataclasses import dataclass, field, replace
 from enum import Enum
 from types import MappingProxyType
 
-__all__ = ["PACKINGS", "PRESSURE_RANGE", "Body", "Friction", "Law", "Plant", "Trend"]
-
 PRESSURE_RANGE = (41740.0, 206840.0)
 """Pressure of the converter at 0 % and 100 % of its input, Pa."""
 

@@ -20,13 +20,7 @@ from scipy.integrate import solve_ivp
 
 from benchmark.harness.rows import Row
 from benchmark.speed.measuring import PERIOD, PRESSURES, VALVES, Settings, medians, pressure
-from valve_friction_ros.model import (
-    BENCH_VALVE,
-    KarnoppParameters,
-    Valve,
-    balanced_state,
-    simulate,
-)
+from valve_friction_ros.model import BENCH_VALVE, KarnoppParameters, Valve, balanced_state, simulate
 
 _ACCURACY = 1e-9
 """Largest error of the position that a peer may make, m: about ours, 0.4 nm."""

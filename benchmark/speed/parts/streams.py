@@ -65,17 +65,13 @@ def _source(valves: Sequence[str], rate: int, seconds: float, *options: str) -> 
     return Process(module("benchmark.speed.stream_source", *valves, *stream))
 
 
-def _nothing(_: Observer) -> None:
-    pass
-
-
 def fed(
     start: Callable[[float], Process],
     valves: Sequence[str],
     rate: int,
     seconds: float,
     options: Sequence[str] = (),
-    meanwhile: Callable[[Observer], object] = _nothing,
+    meanwhile: Callable[[Observer], object] = lambda _: None,
 ) -> Outcome:
     """Start identifiers, stream for `seconds`, and count what arrived."""
     with Observer() as listener, start(2 * seconds + 60) as process:

@@ -52,3 +52,14 @@ def percent(text: str, least: float = -math.inf, words: str = ", such as 90") ->
     if not least <= share <= 1:
         raise argparse.ArgumentTypeError(f"{text!r} is not a percentage{words}")
     return share
+
+
+def require_outputs(*files: Path | None, picture: Path | None = None) -> None:
+    """Refuse files that cannot be written, before the work begins; None is no file."""
+    for path in files:
+        if path is not None and not path.parent.is_dir():
+            raise ValueError(f"{path}: there is no folder {path.parent}")
+    if picture is not None:
+        from valve_friction_ros import figures  # noqa: PLC0415 - slow to import
+
+        figures.require_picture_file(picture)

@@ -25,12 +25,7 @@ from valve_friction_ros.identification.settings import (
 )
 from valve_friction_ros.outside_text import nearest, resembling
 from valve_friction_ros.records.files import cause_of
-from valve_friction_ros.settings import (
-    IDENTIFICATION,
-    SURVEY,
-    identification_from,
-    survey_from,
-)
+from valve_friction_ros.settings import IDENTIFICATION, SURVEY, identification_from, survey_from
 
 if TYPE_CHECKING:
     from valve_friction_ros.health import FrictionLimits, Level
