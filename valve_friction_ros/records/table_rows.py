@@ -211,6 +211,14 @@ class RawTable:
         """True for a text, whose marks are to be found."""
         return not self.cells
 
+    @property
+    def sheets(self) -> list[str]:
+        """The sheets of a workbook, if none was chosen."""
+        if self.form.sheet or self.is_text or _start(self.place) != _ZIP:
+            return []
+        with self.place.open("rb") as stream:
+            return list(_library("openpyxl").load_workbook(stream, read_only=True).sheetnames)
+
     def rows(self, delimiter: str) -> list[tuple[int, list[str]]]:
         """Return the first rows, split by `delimiter`; with each the number of lines up to it."""
         if not self.is_text:
