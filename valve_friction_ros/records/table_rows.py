@@ -166,7 +166,8 @@ class _Bounded(io.RawIOBase):
             raise ValueError(f"a quote has no end within {_LONGEST_LINE} bytes")
 
 
-def _encoding(start: bytes) -> str:
+def encoding_of(start: bytes) -> str:
+    """Return the encoding of a text, by its mark or its first bytes."""
     for mark, encoding in _MARKS:
         if start.startswith(mark):
             return encoding
@@ -345,7 +346,7 @@ def open_raw(path: Path, form: Columns) -> RawTable:
             table = _looked_at(path, form, place)
         else:
             with io.BufferedReader(_Bounded(place, form.maximum_megabytes), _PIECE) as stream:
-                encoding = form.encoding or _encoding(stream.peek(_PIECE)[:_PIECE])
+                encoding = form.encoding or encoding_of(stream.peek(_PIECE)[:_PIECE])
             with _text(place, form, encoding) as text:
                 head = tuple(itertools.islice(text, LOOKED_AT))
             table = RawTable(path, form, place, head, encoding=encoding)
