@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""What forty programs write: each a function of the truth, and of chance, to the bytes of a file.
+"""What fifty programs write: each a function of the truth, and of chance, to the bytes of a file.
 
 The conventions are those of the programs' own exports; numbers are rounded as they round them.
 """
@@ -121,10 +121,12 @@ def _file(
     return Export(name, _joined(rows, mark).encode(encoding), **known)
 
 
-def _workbook(name: str, rows: Iterable[Sequence[object]], **known: Any) -> Export:
+def _workbook(name: str, rows: Iterable[Sequence[object]], cover: str = "", **known: Any) -> Export:
     import openpyxl  # noqa: PLC0415 - an extra
 
     book = openpyxl.Workbook(write_only=True)
+    if cover:
+        book.create_sheet("Cover").append([cover])
     sheet = book.create_sheet("Data")
     for row in rows:
         sheet.append(list(row))
@@ -321,11 +323,16 @@ def ignition_dataset(truth: Truth, random: Random) -> Export:
     return Export("ignition.csv", text.encode(), answers, **coarse)
 
 
+def _every(truth: Truth, seconds: float) -> Truth:
+    """Return what a slow recorder has of the samples."""
+    step = round(seconds / truth.time[1])
+    signals = {name: getattr(truth, name)[::step] for name in ("time", "pressure", "position")}
+    return replace(truth, **signals)
+
+
 def ignition_chart(truth: Truth, random: Random) -> Export:
     """Whole seconds: every sample of a slow valve."""
-    slow = round(1 / truth.time[1])
-    signals = {name: getattr(truth, name)[::slow] for name in ("time", "pressure", "position")}
-    truth = replace(truth, **signals)
+    truth = _every(truth, 1.0)
     pressure, position, coarse = _signals(truth, "kPa", "%")
     zone = _one_of(random, "CEST", "UTC")
     name = {"CEST": "Europe/Berlin", "UTC": "UTC"}[zone]
@@ -602,6 +609,87 @@ def kelvin_lab(truth: Truth, random: Random) -> Export:
     return _file("lab.csv", rows, exact_date=False, **coarse)
 
 
+def ignition_table(truth: Truth, random: Random) -> Export:
+    """Dates as Java writes them in America."""
+    truth = _every(truth, 1.0)
+    pressure, position, coarse = _signals(truth, "psi", "%")
+    times = _times(truth, f"%b <d>, %Y{_one_of(random, ',', '')} <h>:%M:%S %p")
+    rows = [("t_stamp", "FV101/ZT (% open)", "FV101/PT (psi g)")]
+    return _file("table.csv", [*rows, *_columns(times, position, pressure)], **coarse)
+
+
+def yokogawa(truth: Truth, random: Random) -> Export:
+    """Day, time and milliseconds in columns of their own."""
+    pressure, position, coarse = _signals(truth, "kPa", "%")
+    rows = [("GX20",), ("Date", "Time", "sub sec", "PT101", "ZT101"), ("", "", "", "kPa(g)", "%")]
+    times = (_times(truth, form) for form in ("%Y/%m/%d", "%H:%M:%S", "<f>"))
+    return _file("trend.csv", [*rows, *_columns(*times, pressure, position)], **coarse)
+
+
+def rockwell(truth: Truth, random: Random) -> Export:
+    pressure, position, coarse = _signals(truth, "psi", "%")
+    rows = [("Date", "Time", "Millitm", "TagName", "Value", "Status", "Marker", "Internal")]
+    stamps = _columns(*(_times(truth, form) for form in ("%m/%d/%Y", "%H:%M:%S", "<f>")))
+    for stamp, one, other in zip(stamps, pressure, position, strict=True):
+        rows.append((*stamp, "FV101_PT_psi", one, "", "", "-1"))
+        rows.append((*stamp, "FV101_ZT_pct", other, "", "", "-1"))
+    return _file("log.csv", rows, answers={"time_format": "%m/%d/%Y %H:%M:%S.%f"}, **coarse)
+
+
+def merged_cells(truth: Truth, random: Random) -> Export:
+    pressure, position = (truth.pressure / 1e5).tolist(), (1e3 * truth.position).tolist()
+    rows = [
+        (None, "FV-101", None, "FV-102", None),
+        ("Time", "Pressure", "Travel", "Pressure", "Travel"),
+        (None, "bar", "mm", "bar", "mm"),
+        *zip(_dates(truth), pressure, position, pressure[::-1], position, strict=True),
+    ]
+    known = {"answers": {"valve": "FV-101"}, "coarse_pressure": 0.06}
+    return _workbook("unit1.xlsx", rows, **known)
+
+
+def second_sheet(truth: Truth, random: Random) -> Export:
+    rows = [("Time", "Position (mm)", "Pressure (kPa)")]
+    rows += zip(_dates(truth), 1e3 * truth.position, truth.pressure / 1e3, strict=True)
+    known = {"answers": {"sheet": "Data"}, "coarse_pressure": 0.06}
+    return _workbook("report.xlsx", rows, cover="Made for the audit", **known)
+
+
+def quoted_commas(truth: Truth, random: Random) -> Export:
+    """Decimal commas between quotes, and commas between them."""
+    pressure, position, coarse = _signals(truth, "bar", "mm", ",")
+    rows = [("Zeit (s)", "Hub (mm)", "Druck (bar)")]
+    rows += _columns(_rounded(truth.time, 3, ","), position, pressure)
+    text = _joined(rows, ",", quoted=True)
+    return Export("zitiert.csv", text.encode(), exact_date=False, **coarse)
+
+
+def sentinels(truth: Truth, random: Random) -> Export:
+    """A number stands for none, and the zone beside the time."""
+    pressure, position, coarse = _signals(truth, "bar", "%")
+    shown = ["-9999" if random.random() < 0.01 else text for text in position]
+    rows = [("Time (UTC+2)", "ZT-101 [%]", "PT-101 [bar]")]
+    rows += _columns(_times(truth, zone="Etc/GMT-2"), shown, pressure)
+    return _file("holes.csv", rows, **coarse)
+
+
+def excel_minutes(truth: Truth, random: Random) -> Export:
+    """What Excel shows, and saves, of times with fractions: 32:15.0."""
+    truth = _every(truth, 0.1)
+    pressure, position, coarse = _signals(truth, "bar", "%")
+    rows = [("Time", "Position (%)", "Pressure (bar)")]
+    rows += _columns(_times(truth, "%M:%S.<f>", digits=1), position, pressure)
+    return _file("saved.csv", rows, exact_date=False, **coarse)
+
+
+def finnish(truth: Truth, random: Random) -> Export:
+    truth = _every(truth, 1.0)
+    pressure, position, coarse = _signals(truth, "bar", "%", ",")
+    rows = [("Aika", "Asento [%]", "Paine [bar]")]
+    rows += _columns(_times(truth, "%d.%m.%Y %H.%M.%S"), position, pressure)
+    return _file("vienti.csv", rows, ";", answers={"position_column": "Asento [%]"}, **coarse)
+
+
 PROGRAMS: tuple[Callable[[Truth, Random], Export], ...] = (
     libreoffice_german, libreoffice_umlaut, libreoffice_english, excel, pandas_index, pandas_rows,
     pandas_parquet, pi_sampled, pi_csv, pi_pairs, aspen_long, aspen_wide, honeywell,
@@ -609,5 +697,6 @@ PROGRAMS: tuple[Callable[[Truth, Random], Export], ...] = (
     matlab_datenum, matlab_file, labview, labview_clock, plotjuggler, bag_nanoseconds, delta_v,
     exaquantum, current_loop, influx, psql, laboratory, excel_days, newest_first, fraction,
     day_or_month, without_units, several_valves, thousands, german_thousands, win_cc, bad_beyond,
-    opc_quality, kelvin_lab,
+    opc_quality, kelvin_lab, ignition_table, yokogawa, rockwell, merged_cells, second_sheet,
+    quoted_commas, sentinels, excel_minutes, finnish,
 )  # fmt: skip

@@ -238,7 +238,7 @@ def test_what_would_be_read(command, export):
     assert told["questions"] == []
     code, out, _ = command("inspect", export, *ANSWERS)
     assert code == 0
-    assert sum(mark in "▁▂▃▄▅▆▇█" for mark in out) == 40 + 39
+    assert sum(mark in "▁▂▃▄▅▆▇█" for mark in out) == 40 + 38  # a bad one leaves a hole
 
 
 @pytest.mark.parametrize("text", [PLAIN, OF_NODE], ids=["plain", "of a node"])

@@ -56,8 +56,8 @@ class TestBadRecords:
                 lambda c: c["pressure_pa"].put(50, 250000.5),
                 "row 52, column 'pressure_pa': 250000 Pa is outside the sensor's range 0 to 250000",
             ),
-            (lambda c: c.pop("time_s"), "cannot tell the column of the time (--time-column one of"),
-            (lambda c: c.pop("pressure_pa"), "cannot tell the column of the pressure (--press"),
+            (lambda c: c.pop("time_s"), "cannot tell which column is the time, of position_m, "),
+            (lambda c: c.pop("pressure_pa"), "cannot tell which column is the pressure, of "),
         ],
         ids=[
             "empty",

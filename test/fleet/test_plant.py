@@ -322,7 +322,7 @@ class TestTable:
             ("tag,area\nFV-1,445 cm2\n", "row 2: FV-1: travel missing"),
             ("tag,area,travel\nFV-1,445,20 mm\n", "row 2: area: '445': there is no unit"),
             ("area,travel\n445 cm2,20 mm\n", "there is no column tag"),
-            ("tag,aera,travel\nFV-1,445 cm2,20 mm\n", "unknown column 'aera'; did you mean"),
+            ("tag,area,travel,sprng\nA,1 cm2,2 mm,x\n", "unknown column 'sprng'; did you mean"),
             ("tag,area,travel\nA,90 cm2,20 mm\nA,90 cm2,20 mm\n", "row 3: a second A"),
         ],
     )
@@ -338,6 +338,14 @@ class TestTable:
         with pytest.raises(ValueError, match=r"row 2: .*row 3: ") as refusal:
             read_plant(path)
         assert "\n" not in str(refusal.value)
+
+    def test_a_list_of_valves_as_a_spreadsheet_saves_it(self, tmp_path):
+        """In Windows' encoding, with columns that are nobody's business."""
+        path = tmp_path / "valves.csv"
+        text = "Tag;Einbauort;Area [cm2];Travel [mm];Prüfung\nFV-1;Kühlwasser;445;28,6;März\n"
+        path.write_bytes(text.encode("cp1252"))
+        valve = read_plant(path)["FV-1"].valve
+        assert (valve.diaphragm_area, valve.travel) == pytest.approx((0.0445, 0.0286))
 
     def test_what_it_says(self, tmp_path):
         path = tmp_path / "valves.csv"

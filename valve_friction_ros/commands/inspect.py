@@ -42,7 +42,7 @@ _GAP = 10
 """Sampling periods above which a pause is a gap."""
 _BARS = "▁▂▃▄▅▆▇█"
 _PARTS = 60
-"""Parts of the time in the picture of a signal."""
+"""Most parts of the time in the picture of a signal."""
 
 
 def _inspected(valve: str, read: ReadSignal) -> dict[str, Any]:
@@ -88,12 +88,13 @@ def _cells(one: Mapping[str, Any]) -> tuple[str, ...]:
 
 def _course(read: ReadSignal) -> NDArray[np.float64]:
     """Return means of the values over equal parts of the time; nan where there is none."""
-    course = np.full(_PARTS, np.nan)
-    if read.stamps.size:
+    parts = min(_PARTS, read.stamps.size)
+    course = np.full(parts, np.nan)
+    if parts:
         since = read.stamps - read.stamps[0]
-        part = np.minimum(since * _PARTS // (int(since[-1]) + 1), _PARTS - 1)
-        counts = np.bincount(part, minlength=_PARTS)
-        sums = np.bincount(part, read.values, minlength=_PARTS)
+        part = np.minimum(since * parts // (int(since[-1]) + 1), parts - 1)
+        counts = np.bincount(part, minlength=parts)
+        sums = np.bincount(part, read.values, minlength=parts)
         course[counts > 0] = sums[counts > 0] / counts[counts > 0]
     return course
 
@@ -133,7 +134,8 @@ def _print(layout: Layout, reads: list[ReadSignal], signals: list[dict[str, Any]
         if begin >= _DATED:
             console.print(f"begins {utc_second(begin)}")
     if others:
-        console.print(f"other columns: {', '.join(others)}", soft_wrap=True)
+        which = "other columns" if signals else "columns"
+        console.print(f"{which}: {', '.join(others)}", soft_wrap=True)
 
 
 def _draw(options: argparse.Namespace, path: Path) -> None:

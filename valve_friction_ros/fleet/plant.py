@@ -18,10 +18,11 @@ from typing import Any
 
 import yaml
 
-from valve_friction_ros.outside_text import nearest
+from valve_friction_ros.outside_text import nearest, resembling
 from valve_friction_ros.records.columns import Columns
 from valve_friction_ros.records.files import cause_of
 from valve_friction_ros.records.table import OpenTable
+from valve_friction_ros.records.table_rows import encoding_of
 from valve_friction_ros.records.valve_description import QUESTIONS, valve_description
 from valve_friction_ros.records.valve_file import ValveFile, valve_file_of
 
@@ -65,9 +66,10 @@ def _row(cells: Mapping[str, tuple[str, str]]) -> str:
 
 
 def _table(path: Path) -> tuple[list[tuple[str, str]], list[list[str]]]:
-    """Return the columns of a table with their units, and its rows; refuse unknown columns."""
+    """Return the columns of a table with their units, and its rows; refuse misspelled columns."""
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        content = path.read_bytes()
+        text = content.decode(encoding_of(content))
         dialect = csv.Sniffer().sniff(text[:10_000], ",;\t")
         header, *rows = [row for row in csv.reader(text.splitlines(), dialect) if any(row)]
     except (OSError, UnicodeError, csv.Error, ValueError) as error:
@@ -76,8 +78,8 @@ def _table(path: Path) -> tuple[list[tuple[str, str]], list[list[str]]]:
     for cell in header:
         found = _HEADER.fullmatch(cell)
         name = found[1].casefold().replace(" ", "_") if found else cell
-        if name not in _KNOWN:
-            raise ValueError(f"{path}: unknown column {cell[:60]!r}: {nearest(name, _KNOWN)}")
+        if name not in _KNOWN and (close := resembling(name, _KNOWN)):
+            raise ValueError(f"{path}: unknown column {cell[:60]!r}: {nearest(name, close)}")
         heads.append((name, (found[2] or "") if found else ""))
     if "tag" not in dict(heads):
         raise ValueError(f"{path}: there is no column tag: give tag, area, travel, spring, range")
@@ -89,7 +91,8 @@ def read_plant(path: Path) -> dict[str, ValveFile]:
 
     A number has its unit in its cell or in its header, as ``travel [mm]``. Further columns are
     ``air_to``, ``sensor`` (gauge or absolute), ``opposing_area``, ``mass``, and what a valve file
-    says in its section ``columns:``, as ``pressure_unit``.
+    says in its section ``columns:``, as ``pressure_unit``. Others, as of a list of valves, are
+    passed over.
 
     Returns
     -------
@@ -108,7 +111,7 @@ def read_plant(path: Path) -> dict[str, ValveFile]:
         cells = {
             name: (cell.strip(), unit)
             for (name, unit), cell in zip(heads, row, strict=False)
-            if cell.strip()
+            if cell.strip() and name in _KNOWN
         }
         try:
             if "tag" not in cells:

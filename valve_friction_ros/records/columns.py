@@ -53,8 +53,7 @@ class Columns:
     """What is said of a table that it does not tell itself, in the words of the options.
 
     The same words are the keys of the section ``columns:`` of a valve file. What is empty is
-    recognized from the table. Units are those of `records.units`; a column that is named here, and
-    whose unit nobody says, is in its SI unit.
+    recognized from the table. Units are those of `records.units`.
 
     Raises ValueError, which names the word, if a value is impossible.
     """
@@ -144,8 +143,6 @@ class Columns:
             )
         if self.decimal not in ("", ".", ","):
             raise ValueError(f"the decimal mark must be '.' or ',', got {self.decimal[:40]!r}")
-        if self.decimal and self.decimal == self.delimiter:
-            raise ValueError(f"delimiter and decimal mark are both {self.decimal!r}")
         try:
             if self.encoding:
                 "".encode(self.encoding)

@@ -53,7 +53,7 @@ _OTHER = frozenset(_OTHER_WORDS.split())
 """Words of signals that are neither the actuator's nor the stem's."""
 _STRONG = frozenset(_STRONG_WORDS.split())
 """Words that speak of the actuator or of the stem itself."""
-_ISA = re.compile(r"(pi?t|pi|zi?t|zi|gi?t)(\d+[a-z]?)?")
+_ISA = re.compile(r"(?P<unit>\d*)(?P<letters>pi?t|pi|zi?t|zi|gi?t)(?P<loop>\d+[a-z]?)?")
 """Letters of instruments by ISA 5.1: pressure, position (Z), gauge of position (G)."""
 _CAMEL = re.compile(r"(?<=[a-zäöü])(?=[A-ZÄÖÜ])|(?<=[A-Z])(?=[A-Z][a-zäöü])")
 _BRACKETS = re.compile(r"[\[({<]([^\])}>]*)[\])}>]")
@@ -96,8 +96,7 @@ class Named(NamedTuple):
 
 def known_unit(text: str) -> str:
     """Return the unit that a text is, or nothing."""
-    plain = text.strip().strip("[](){}<>").strip()
-    unit = unit_named(plain)
+    unit = unit_named(text)
     return unit if unit in _KNOWN else ""
 
 
@@ -141,18 +140,22 @@ def named(texts: Sequence[str], unit_cell: str = "") -> Named:
     words = [
         word.casefold() for word in re.split(r"[^\w]+|_", _CAMEL.sub(" ", " ".join(rest))) if word
     ]
-    found, label, is_strong = [], [], False
+    found: list[str] = []
+    label: list[str] = []
+    is_strong = False
     for place, word in enumerate(words):
         isa = _ISA.fullmatch(word)
         quantity = _QUANTITY.get(word, "")
         is_strong |= word in _STRONG
         if word in _OTHER:
             found.append("other")
-        elif isa and (isa[2] or (words[place + 1 : place + 2] and words[place + 1][:1].isdigit())):
-            found.append("pressure" if isa[1].startswith("p") else "position")
-            label += [isa[2]] if isa[2] else []
-        elif isa and isa[1] in ("pt", "zt", "pit", "zit", "gt"):
-            found.append("pressure" if isa[1].startswith("p") else "position")
+        elif isa and (
+            isa["loop"]
+            or isa["letters"] in ("pt", "zt", "pit", "zit", "gt")
+            or (words[place + 1 : place + 2] and words[place + 1][0].isdigit())
+        ):
+            found.append("pressure" if isa["letters"].startswith("p") else "position")
+            label += filter(None, (isa["unit"], isa["loop"]))
         elif quantity:
             found.append(quantity)
         elif word not in _STRONG and word not in _IDLE:

@@ -9,6 +9,7 @@
 
 """A table as it is seen at first, and how it is to be read: signals, times, marks, questions."""
 
+import itertools
 import re
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
@@ -288,12 +289,15 @@ class Look:
             texts.sort(key=lambda row: -sum(map(bool, row)))  # a stable order: the uppermost first
             texts = [row for row in texts if sum(map(bool, row)) >= 0.6 * sum(map(bool, texts[0]))]
         names = _names(texts[0]) if texts else [str(place + 1) for place in range(wide)]
-        columns = []
-        for place in range(wide):
-            name = names[place] if place < len(names) else ""
+        names = _with_groups(names, header[: header.index(texts[0])] if texts else [])
+        names += [""] * (wide - len(names))
+        columns: list[SeenColumn] = []
+        for place, name in enumerate(names):
             own = [name] + [row[place] for row in texts[1:] if place < len(row)]
             unit = units[place] if place < len(units) else ""
-            column = SeenColumn(place, name, named(own, unit) if texts else Named(""))
+            count = names[: place + 1].count(name) if name and names.count(name) > 1 else 0
+            title = f"{name} ({count})" if count else name
+            column = SeenColumn(place, title, named(own, unit) if texts else Named(""))
             column.cells = [row[place] if place < len(row) else "" for row in values]
             column.kind = self._kind(column)
             columns.append(column)
@@ -315,9 +319,9 @@ class Look:
             "day": is_day,
         }
         counts = {kind: sum(map(test, cells)) for kind, test in tests.items()}
-        if column.said.quantity == "time" and self.form.time_format:
-            return "date"
         best = max(counts, key=lambda kind: counts[kind])
+        if column.said.quantity == "time" and self.form.time_format and best in ("number", "date"):
+            return "date"
         if best == "day" and counts["number"] == counts["day"] and column.said.quantity != "time":
             best = "number"
         return best if counts[best] >= 0.3 * len(cells) else "text"
@@ -341,13 +345,10 @@ class Look:
     def by_name(self, name: str, option: str) -> SeenColumn | None:
         """Return the column of a name that was given; ask again if there is none, or two."""
         found = [column for column in self.columns if column.name == name]
-        if len(found) == 1:
+        if found:
             return found[0]
-        if len(found) > 1:
-            self.questions.append(f"two columns are named {name!r}: rename one of them")
-            return None
         more = ", …" if len(self.columns) > _MOST_NAMES else ""
-        self.questions.append(f"there is no column {name!r} among {self.names}{more} ({option})")
+        self.questions.append(f"which column is {name!r}, of {self.names}{more} ({option})")
         return None
 
 
@@ -357,6 +358,19 @@ def _names(row: Sequence[str]) -> list[str]:
     if names[:1] == ["#"]:
         return names[1:]
     return [names[0].lstrip("#").lstrip(), *names[1:]] if names else []
+
+
+def _with_groups(names: list[str], above: Sequence[Sequence[str]]) -> list[str]:
+    """Put the merged cells of a row above, as valves over their signals, before repeated names."""
+    for row in reversed(above):
+        groups: list[str] = []
+        for cell in row:
+            groups.append(cell or (groups[-1] if groups else ""))
+        names = [
+            f"{group} {name}" if group and names.count(name) > 1 else name
+            for name, group in itertools.zip_longest(names, groups, fillvalue="")
+        ]
+    return names
 
 
 def _is_value(cell: str, decimal: str) -> bool:

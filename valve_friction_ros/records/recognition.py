@@ -33,7 +33,13 @@ from valve_friction_ros.records.layout import (
     quoted,
 )
 from valve_friction_ros.records.table_rows import RawTable
-from valve_friction_ros.records.written_times import TimeForm, clock_of, date_forms, is_date
+from valve_friction_ros.records.written_times import (
+    TimeForm,
+    clock_of,
+    date_forms,
+    in_one,
+    is_date,
+)
 
 _MOST_CHOICES, _MOST_TAGS = 6, 10_000
 _COARSE = 0.5
@@ -41,6 +47,9 @@ _COARSE = 0.5
 _GOOD = re.compile(r"(good|ok|gut|valid|true|g|yes|ja|gültig)\b.*|\(?good\b.*", re.IGNORECASE)
 _OPC_GOOD, _OPC_MOST, _CERTAIN = 192, 255, 100
 """Qualities of OPC from good on, and the confidence of a historian in a value that was measured."""
+
+_MILLISECONDS = re.compile(r"milli\w*|m ?sec|ms|sub ?sec\w*", re.IGNORECASE)
+"""Headers of the milliseconds beside a time of the day."""
 
 _LOCAL = ("d", "microdays")
 """Units of clocks that count days: they are local, as those of spreadsheets are."""
@@ -73,14 +82,22 @@ class _Recognition(Look):
             return fine or dates
         for day, clock in pairwise(self.columns):
             if (day.kind, clock.kind) == ("day", "clock"):
-                return [(day.place, clock.place)]
-        if clocks := self.of_kind("clock"):
-            return [(clocks[0].place,)]
+                beside = self.columns[clock.place + 1 : clock.place + 2]
+                rest = (one.place for one in beside if _MILLISECONDS.fullmatch(one.name))
+                return [(day.place, clock.place, *rest)]
         numeric = self._numeric_times()
+        if clocks := self.of_kind("clock") or ([] if numeric else self._written()):
+            return [(clocks[0].place,)]
         if len(numeric) == 1 or (numeric and self._are_pairs(numeric)):
             return [(column.place,) for column in numeric]
-        self._ask_column("time", numeric or self.of_kind("number", ""))
+        possible = [one for one in self.of_kind("number", "") if not one.said.unit]
+        self._ask_column("time", numeric or possible)
         return []
+
+    def _written(self) -> list[SeenColumn]:
+        """Return the columns of what may be times in a form that is not known."""
+        texts = [one for one in self.of_kind("text") if not self._repeats(one.place)]
+        return [one for one in texts if re.search(r"\d\D+\d", one.filled[0])]
 
     def _repeats(self, place: int) -> bool:
         """Return whether times come more often than the signals of a long form explain."""
@@ -114,12 +131,11 @@ class _Recognition(Look):
         zone = form.time_zone or self._stated_zone()
         if form.time_format:
             return TimeForm((form.time_format,), zone, has_zone="%z" in form.time_format)
-        if len(places) == 2:
-            clock = self.columns[places[1]]
-            texts = [f"{a} {b}" for a, b in zip(column.cells, clock.cells, strict=True) if a and b]
-            return self._dates(texts, zone)
-        if column.kind == "date":
-            return self._dates([cell for cell in column.filled if is_date(cell)], zone)
+        if len(places) > 1:
+            parts = zip(*(self.columns[place].cells for place in places), strict=True)
+            return self._dates([in_one(part) for part in parts if all(part)], zone)
+        if column.kind in ("date", "text"):
+            return self._dates(list(filter(is_date, column.filled)) or column.filled, zone)
         if column.kind == "clock":
             return TimeForm()
         return self._numeric_form(column, zone)
@@ -163,6 +179,9 @@ class _Recognition(Look):
         above = " ".join(cell for _, row in self.rows[: self.start] for cell in row)
         found = re.findall(r"\b[A-Z][A-Za-z]+/[A-Z][A-Za-z_]+\b", above)
         known = [one for one in dict.fromkeys(found) if one in zoneinfo.available_timezones()]
+        offsets = re.findall(r"\b(?:UTC|GMT)([+\-−]\d{1,2})(?::?00)?\b", above)
+        # the Etc zones count westwards
+        known += [f"Etc/GMT{-int(one.replace('−', '-')):+d}" for one in dict.fromkeys(offsets)]
         return known[0] if len(known) == 1 else ""
 
     # Signals.
@@ -235,9 +254,10 @@ class _Recognition(Look):
     def _ask_name(self, quantity: str, among: Sequence[str]) -> None:
         listed = " or ".join(shlex.quote(name) for name in among[:_MOST_CHOICES])
         more = " …" if len(among) > _MOST_CHOICES else ""
-        listed = listed or f"one of {self.names}"
-        article = "the column of the" if self.tag_place is None else "the tag of the"
-        self.questions.append(f"{article} {quantity} (--{quantity}-column {listed}{more})")
+        listed = f" {listed}{more}" if among else ""
+        what = "column" if self.tag_place is None else "tag"
+        what = f"which {what} is the {quantity}" + ("" if among else f", of {self.names}")
+        self.questions.append(f"{what} (--{quantity}-column{listed})")
 
     def _signal(self, quantity: str, name: str, said: Named, place: int) -> TableSignal:
         unit = self._unit(quantity, name, said, place)
@@ -258,8 +278,6 @@ class _Recognition(Look):
         for unit in (said.unit, self._unit_in_cells(place)):
             if unit in KNOWN_UNITS[quantity]:
                 return unit
-        if name in self.given:
-            return {"position": "m", "pressure": "Pa", "force": "N"}[quantity]
         numbers = self._of_signal(name, place)
         span = f", values from {min(numbers):g} to {max(numbers):g}" if numbers else ""
         known = " ".join(KNOWN_UNITS[quantity])
@@ -309,7 +327,7 @@ class _Recognition(Look):
             return lambda cell: _GOOD.fullmatch(cell.strip()) is not None
         elif len(set(cells)) == 1:
             return lambda cell: cell.strip() == cells[0]
-        said = ", ".join(map(quoted, dict.fromkeys(cells[:_MOST_CHOICES])))
+        said = ", ".join(map(quoted, [*dict.fromkeys(cells)][:_MOST_CHOICES]))
         self.questions.append(
             f"which of {quoted(column.name)} are good: {said} (--good-quality, with commas)"
         )
@@ -319,6 +337,8 @@ class _Recognition(Look):
         """Return the signals of each valve; what is open is asked for."""
         if self.start == len(self.rows):
             where = "under the header" if len(self.columns) > 1 else f"in {len(self.rows)} rows"
+            if len(sheets := self.raw.sheets) > 1:
+                where = f"in its first sheet (--sheet {' or '.join(map(shlex.quote, sheets[1:]))})"
             self.questions.append(f"what it holds: there are no values {where}")
             return {}
         places = self._time_places()
@@ -400,10 +420,12 @@ class _Recognition(Look):
                 if len(found) == 1:
                     self._unit(quantity, *found[0])
                 continue
-            unknown = [
-                name for name, said_, _ in candidates if said_.quantity in ("", "value", "command")
+            among = found or [
+                each for each in candidates if each[1].quantity in ("", "value", "command")
             ]
-            self._ask_name(quantity, [name for name, _, _ in found] or unknown)
+            self._ask_name(quantity, [name for name, _, _ in among])
+            if among and not any(said_.unit for _, said_, _ in among):
+                self.questions[-1] += f", and its unit (--{quantity}-unit)"
 
 
 def _as_written(label: str, name: str) -> str:

@@ -29,7 +29,8 @@ from valve_friction_ros.records.layout import Layout, TableSignal, quoted
 from valve_friction_ros.records.recognition import recognized
 from valve_friction_ros.records.recorded_valve import Stretch
 from valve_friction_ros.records.table_rows import open_raw
-from valve_friction_ros.records.written_times import NO_TIME, TimeForm, WrittenTimes
+from valve_friction_ros.records.units import SHARES
+from valve_friction_ros.records.written_times import NO_TIME, TimeForm, WrittenTimes, in_one
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -37,6 +38,8 @@ if TYPE_CHECKING:
 _MOST_WORDS = 4
 """Kinds of bad entries that a message names. Chosen: it stays on one line."""
 _MOST_TAGS = 10_000
+_MOST_SPANS = 3.0
+"""Spans of a share, as -100 to 200 %, beyond which a number stands for none, as -9999. Chosen."""
 _MOST_REPEATED = 0.5
 """Share of rows that may repeat the row above, to the last value. Chosen."""
 
@@ -122,7 +125,7 @@ class OpenTable:
         layout = self.layout
         if not layout.questions:
             return
-        if not layout.times and not layout.valves and len(layout.headers) < 2:
+        if layout.raw.is_text and not layout.times and len(layout.headers) < 2:
             (only, *_) = (*layout.headers, "")
             raise ValueError(
                 f"{self.path}: there is only one column, {quoted(only)}: name the delimiter of the "
@@ -202,8 +205,9 @@ class OpenTable:
     ) -> NDArray[np.int64]:
         form = self.layout.times[key]
         cells = block[key[0]]
-        if len(key) == 2:
-            cells = cells.fillna("").str.strip() + " " + block[key[1]].fillna("").str.strip()
+        if len(key) > 1:
+            parts = block[list(key)].fillna("").astype(str).itertuples(index=False, name=None)
+            cells = type(cells)(map(in_one, parts), index=cells.index)
         values = self._numbers(cells, form.unit) if form.unit else np.empty(0)
         return clock(cells, values)
 
@@ -229,6 +233,10 @@ class OpenTable:
             there &= (stamps == NO_TIME) | ((stamps >= bounds[0]) & (stamps <= bounds[1]))
         values = np.full(len(block), np.nan)
         values[there] = self._numbers(cells[there], signal.unit)
+        if signal.unit in SHARES:
+            low, high = SHARES[signal.unit]
+            is_no_share = np.abs(2 * values - low - high) > _MOST_SPANS * (high - low)
+            values[is_no_share] = np.nan
         good = there & np.isfinite(values)
         if signal.quality is not None:
             tell = self.layout.good[signal.quality]

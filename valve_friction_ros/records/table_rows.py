@@ -166,7 +166,8 @@ class _Bounded(io.RawIOBase):
             raise ValueError(f"a quote has no end within {_LONGEST_LINE} bytes")
 
 
-def _encoding(start: bytes) -> str:
+def encoding_of(start: bytes) -> str:
+    """Return the encoding of a text, by its mark or its first bytes."""
     for mark, encoding in _MARKS:
         if start.startswith(mark):
             return encoding
@@ -210,6 +211,14 @@ class RawTable:
     def is_text(self) -> bool:
         """True for a text, whose marks are to be found."""
         return not self.cells
+
+    @property
+    def sheets(self) -> list[str]:
+        """The sheets of a workbook, if none was chosen."""
+        if self.form.sheet or self.is_text or _start(self.place) != _ZIP:
+            return []
+        with self.place.open("rb") as stream:
+            return list(_library("openpyxl").load_workbook(stream, read_only=True).sheetnames)
 
     def rows(self, delimiter: str) -> list[tuple[int, list[str]]]:
         """Return the first rows, split by `delimiter`; with each the number of lines up to it."""
@@ -337,7 +346,7 @@ def open_raw(path: Path, form: Columns) -> RawTable:
             table = _looked_at(path, form, place)
         else:
             with io.BufferedReader(_Bounded(place, form.maximum_megabytes), _PIECE) as stream:
-                encoding = form.encoding or _encoding(stream.peek(_PIECE)[:_PIECE])
+                encoding = form.encoding or encoding_of(stream.peek(_PIECE)[:_PIECE])
             with _text(place, form, encoding) as text:
                 head = tuple(itertools.islice(text, LOOKED_AT))
             table = RawTable(path, form, place, head, encoding=encoding)

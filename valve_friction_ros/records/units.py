@@ -91,7 +91,7 @@ NANOSECONDS: Mapping[str, int] = {
 """Units of time in nanoseconds, the unit of all stamps."""
 
 _NAMES = {
-    PERCENT: "%, pct, prozent",
+    PERCENT: "%, pct, prozent, % open, %open, percent open, % travel, % of travel, % of span",
     "fraction": "0-1, 0..1, p.u., pu, ratio",
     "mA": "4-20 mA, 4..20 mA",
     "us": "µs, μs",
@@ -110,17 +110,19 @@ _NAMES = {
     "mbar": "mbarg",
     "bar": "barg, bara",
     "psi": "psig, psia",
-    "kgf/cm2": "kg/cm2, kg/cm², kgf/cm²",
+    "kgf/cm2": "kg/cm2, kg/cm², kgf/cm², kg/cm2g, kg/cm²g",
+    "inH2O": "in h2o, inwc, in wc, inch wc, inches h2o",
 }
 _OTHER_NAMES = {name: unit for unit, names in _NAMES.items() for name in names.split(", ")}
 
-_GAUGE_OR_ABSOLUTE = re.compile(r"\s*(?:\((?:g|a|abs|gauge|Ü|ü)\)|\s(?:abs|gauge|absolute|Ü|ü))$")
+_BRACKETS = str.maketrans("[](){}<>", " " * 8)
+_GAUGE_OR_ABSOLUTE = re.compile(r"\s+(?:g|a|abs|gauge|absolute|ü)$", re.IGNORECASE)
 """What follows a unit of pressure; the `pressure_reference` of the valve says the same."""
 
 
 def unit_named(name: str) -> str:
     """Return the name that this module has for a unit, whatever its case; else it as it is."""
-    plain = _GAUGE_OR_ABSOLUTE.sub("", name.strip())
+    plain = _GAUGE_OR_ABSOLUTE.sub("", name.translate(_BRACKETS).strip())
     return _OTHER_NAMES.get(plain) or _BY_CASE.get(plain.casefold(), name)
 
 

@@ -45,17 +45,18 @@ _DATE = (
     r"(?:(?P<iso>\d{4})(?P<s1>[-/.])\d{1,2}(?P=s1)\d{1,2}"
     r"|(?P<compact>\d{8})"
     r"|(?P<first>\d{1,2})(?P<s2>[-/.])(?P<second>\d{1,2})(?P=s2)(?P<year>\d{4}|\d{2})"
-    r"|\d{1,2}(?P<s3>[-. ]{1,2})(?P<month>[A-Za-zäÄ]{3,9})(?P<s4>[-. ]{1,2})(?P<year3>\d{4}|\d{2}))"
+    r"|\d{1,2}(?P<s3>[-. ]{1,2})(?P<month>[A-Za-zäÄ]{3,9})(?P<s4>[-. ]{1,2})(?P<year3>\d{4}|\d{2})"
+    r"|[A-Z][a-z]{2} \d{1,2}, (?P<american>\d{4}))"
 )
 _CLOCK = (
-    r"(?P<hour>\d{1,2})(?P<colon>:?)\d\d"
+    r"(?P<hour>\d{1,2})(?P<colon>[:.]?)\d\d"
     r"(?:(?P=colon)(?P<seconds>\d\d)(?:(?P<mark>[.,:])(?P<fraction>\d{1,9}))?)?"
     r"(?P<gap>\s*)(?P<half>[AaPp]\.?[Mm]\.?)?"
     r"(?P<gap2>\s*)(?P<zone>[Zz]|[+\-]\d\d:?\d\d|[+\-]\d\d|UTC|GMT|CET|MEZ|CEST|MESZ)?"
 )
 _STAMP = re.compile(rf"{_DATE}(?P<join>[Tt]|,?\s+){_CLOCK}")
 _DAY = re.compile(_DATE)
-_OF_DAY = re.compile(r"\d{1,2}:\d\d(?::\d\d(?:[.,]\d+)?)?\s*(?:[AaPp][Mm])?")
+_OF_DAY = re.compile(r"\d{1,2}:\d\d(?::\d\d)?(?:[.,]\d+)?\s*(?:[AaPp][Mm])?")
 _DURATION = re.compile(r"(?:\d+ days? )?\d{1,3}:\d\d:\d\d(?:[.,]\d+)?")
 
 
@@ -77,6 +78,12 @@ def is_time_of_day(text: str) -> bool:
     """Return whether a text is a time without a date, or a duration."""
     text = text.strip()
     return len(text) < 40 and bool(_OF_DAY.fullmatch(text) or _DURATION.fullmatch(text))
+
+
+def in_one(parts: Sequence[str]) -> str:
+    """Return a date, a time of the day and, if there are any, its milliseconds as one text."""
+    day, clock, *rest = (part.strip() for part in parts)
+    return f"{day} {clock}" + "".join(f".{one:0>3}" for one in rest)
 
 
 @dataclass(frozen=True)
@@ -160,6 +167,8 @@ def _format(found: re.Match[str], first: str, second: str) -> str:
     elif found["first"]:
         year = "%Y" if len(found["year"]) == 4 else "%y"
         date = f"{first}{found['s2']}{second}{found['s2']}{year}"
+    elif found["american"]:
+        date = "%b %d, %Y"
     else:
         year = "%Y" if len(found["year3"]) == 4 else "%y"
         date = f"%d{found['s3']}%b{found['s4']}{year}"
