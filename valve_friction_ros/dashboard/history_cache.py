@@ -34,7 +34,6 @@ from valve_friction_ros.health import (
     dead_band,
     dead_band_half_width,
 )
-from valve_friction_ros.health.diagnosis import survey_of
 from valve_friction_ros.history import (
     AlarmFilter,
     HistoryError,
@@ -307,11 +306,10 @@ def _status_of(kept: ValveHistory, alarms: Mapping[AlarmKind, Alarm]) -> Status:
         band, half_width = dead_band(found, valve), dead_band_half_width(found, valve)
         values["estimate_time"] = exact_time(found.time)
         values |= result_values(found.to_dict(), band, half_width)
-        survey = survey_of(found, valve)
-        if kept.set_baseline is None and survey is not Survey.UNKNOWN:
-            values["survey"] = survey.value
     baseline = None if kept.set_baseline is None else kept.set_baseline.baseline
     values |= baseline_values(baseline)
+    if baseline is None and diagnosis.survey is not Survey.UNKNOWN:
+        values["survey"] = diagnosis.survey.value
     values |= ratio_values(diagnosis.ratio)
     values |= trend_values(kept.trend)
     values |= alarm_values(alarms)
