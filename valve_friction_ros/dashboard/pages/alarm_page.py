@@ -216,7 +216,7 @@ class _AlarmPage:
         found = await asked_of_person(title, only, self._context.visitors.name())
         if found is None:
             return
-        if not self._context.history.is_file:
+        if self._context.is_live and not self._context.history.is_file:
             await self._call([(o.valve.name, o.event.alarm.kind.value) for o in some], found)
             return
         try:
