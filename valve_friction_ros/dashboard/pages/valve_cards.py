@@ -42,7 +42,7 @@ from valve_friction_ros.dashboard.pages.theme import (
     table_row,
     text,
 )
-from valve_friction_ros.dashboard.plant_rows import moment, quantity_texts
+from valve_friction_ros.dashboard.plant_rows import FRICTIONS, moment, quantity_texts
 from valve_friction_ros.health import AlarmEvent, Baseline
 from valve_friction_ros.history import HistoryEntry, ValveHistory, drift_text
 from valve_friction_ros.outside_text import printable
@@ -201,10 +201,13 @@ def baseline_words(baseline: Baseline | None) -> str:
 
 
 def _friction(entry: HistoryEntry) -> str:
-    for name in ("coulomb_friction", "sliding_friction"):
+    """Write the friction that was compared with the baseline, or one that is known."""
+    ratio = entry.diagnosis.ratio
+    for name in (*([ratio.of] if ratio else []), *FRICTIONS):
         one = entry.parameters.get(name)
         if one is not None and one.value == one.value:
-            return " ".join(number_and_width(one.value, one.half_width)).strip()
+            words = (*number_and_width(one.value, one.half_width), FRICTIONS[name])
+            return " ".join(filter(None, words))
     return "–"
 
 

@@ -51,6 +51,7 @@ from valve_friction_ros.dashboard.pages.valve_cards import (
     draw_trend,
 )
 from valve_friction_ros.dashboard.plant_rows import (
+    FRICTIONS,
     Selection,
     ago,
     drift_number,
@@ -124,6 +125,8 @@ def _facts(view: ValveView, heard: Heard | None, page: Frame, is_live: bool) -> 
     made = view.identified
     age = "" if made is None else f"  ({ago(time.time() - made / 1e9)} ago)"
     facts = {
+        "friction": _with_unit(view.friction, f"N {FRICTIONS[view.friction.name]}"),
+        "baseline": _with_unit(view.healthy, "N"),
         "friction ÷ baseline": ratio,
         "dead band": _with_unit(view.dead_band, "% of travel"),
         "drift": _drift_words(view),
@@ -146,8 +149,8 @@ def _with_unit(one: Quantity, unit: str) -> str:
 
 def _drift_words(view: ValveView) -> str:
     if view.drift is None:
-        return "none that is significant" if view.friction.is_known else "–"
-    words = f"{drift_number(view.drift)} N a month"
+        return "–"
+    words = f"{drift_number(view.drift)} N per month"
     expected = view.drift.expected
     return f"{words}; limit {expected.date}" if expected else words
 
