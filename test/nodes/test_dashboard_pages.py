@@ -439,20 +439,28 @@ def test_an_alarm_is_acknowledged_with_a_name_and_exported(identified, tab):
     identified.client.set_parameters(NODE, {"baseline_coulomb_friction": float("nan")})
 
 
-def test_of_many_alarms_those_near_the_view_are_drawn(plant, tab):
+@pytest.mark.parametrize(
+    ("path", "line"),
+    [
+        ("/alarms?area=/many", ".vf-alarm-list tbody tr"),
+        ("/?q=/many", ".vf-row"),
+        ("/?q=/many&view=tiles", ".vf-tile"),
+    ],
+)
+def test_of_many_those_near_the_view_are_drawn(plant, tab, path, line):
     """All come as the page is scrolled."""
     history = HistoryFile(plant.folder / "valve_friction_ros" / "history.sqlite")
     shown = Condition(Level.ERROR, StatusSignal.FAILURE, "excess friction")
     for number in range(400):
         valve = KeptValve(f"/many/fv_{number}/identifier", f"MANY-{number}")
         follow_alarms(history, valve, {AlarmKind.FRICTION_HIGH: shown}, time.time_ns())
-    page = tab.open("/alarms?area=/many")
-    lines = page.locator(".vf-alarm-list tbody tr")
+    page = tab.open(path)
+    lines = page.locator(line)
     page.get_by_text("more below").wait_for()
     assert 0 < lines.count() < 400
     while (count := lines.count()) < 400:
         page.mouse.wheel(0, 20_000)
-        page.wait_for_function(f"document.querySelectorAll('tbody tr').length > {count}")
+        page.wait_for_function(f"document.querySelectorAll('{line}').length > {count}")
     page.get_by_text("more below").wait_for(state="detached")
 
 

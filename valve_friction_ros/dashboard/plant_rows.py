@@ -298,6 +298,7 @@ def row_of(valve: Heard, spark: Sparkline | None, wall: float, href: str) -> Row
         "state": state_of(valve),
         "ne": "" if valve.is_silent else view.signal.value,
         "word": state_words(valve),
+        "advice": "" if valve.is_silent else view.advice,
         "say": view.sentence[:_SAY] or ("no message has been heard" if valve.is_silent else ""),
         **_ratio(view.ratio),
         "dead": dead,
