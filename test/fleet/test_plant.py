@@ -305,7 +305,7 @@ class TestDashboard:
                     assert "1.79" in page.locator(".vf-row").first.inner_text()
                     assert "live" not in page.inner_text("table")
                     page.get_by_role("link", name="FV-101").click()
-                    page.get_by_text("N a month; excess expected").wait_for()
+                    page.get_by_text("N per month; excess expected").wait_for()
                     assert page.title() == "FV-101 · valve friction"
                     assert "2026-07-03 08:00:19 CEST" in page.inner_text("article")
                     assert not page.get_by_role("button", name="Identify").count()

@@ -21,7 +21,7 @@ export default {
   template: `
   <div class="vf-plant" @keydown="move">
     <p class="vf-lost" v-if="lost > 4" role="alert">
-      No connection to the dashboard for {{ age(lost) }}: what is shown is as old.
+      No connection to the dashboard for {{ age(lost) }}: the values shown are that old.
     </p>
     <table v-if="!tiled" class="vf-table">
       <thead><tr>
@@ -41,7 +41,7 @@ export default {
             v-memo="[row, since(row), heard(row)]" @click="open($event, row)">
           <td class="vf-c-state">${CELLS}</td>
           <td class="vf-c-tag"><a :href="row.href">{{ row.tag }}</a><small>{{ row.place }}</small></td>
-          <td class="vf-c-say"><span :title="row.say">{{ row.say }}</span></td>
+          <td class="vf-c-say"><b v-if="row.advice">{{ row.advice }}</b><span :title="row.say">{{ row.say }}</span></td>
           <td class="vf-c-ratio vf-n" data-label="friction ratio">
             <span class="vf-bar" aria-hidden="true"><i v-if="row.bar"
               :style="{left: row.bar[1] + '%', right: 100 - row.bar[2] + '%'}"></i><u v-if="row.bar"
@@ -52,7 +52,7 @@ export default {
           <td class="vf-c-trend"><svg v-if="row.spark" viewBox="0 0 100 24" preserveAspectRatio="none"
               role="img" :aria-label="'friction ratio of the last ' + row.days + ' days'">
               <path class="vf-one" :d="row.base"/><path :d="row.spark"/></svg><small>{{ row.expected }}</small></td>
-          <td class="vf-c-drift vf-n" data-label="drift, N a month"><b>{{ row.drift }}</b></td>
+          <td class="vf-c-drift vf-n" data-label="drift, N per month"><b>{{ row.drift }}</b></td>
           <td class="vf-c-age vf-n" data-label="identified">{{ since(row) }}</td>
           <td v-if="live" class="vf-c-heard vf-n" data-label="heard">{{ heard(row) }}</td>
         </tr>
