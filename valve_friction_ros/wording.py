@@ -358,7 +358,7 @@ _LACKS = {
     "SIZE": "{of} is not above zero",
     "INTERVAL": "{of} has no interval",
     "PRECISION": "{of} is known to ±{share}, and a baseline needs ±{largest}",
-    "HEALTH": "the valve is in alarm, which another baseline may hide",
+    "HEALTH": "the valve is in alarm, which a new baseline could hide",
 }
 _LACKS_OF_MOVES = "friction by the moves in service"
 
@@ -373,7 +373,7 @@ def lack_words(of: str, lack: str, share: float, largest: float) -> str:
 
 _BETTER_RECORD = (
     "Identify a record with more strokes, some fast and some slow.",
-    "Plan a stroke test from which friction will be known well enough: valve_friction plan-test.",
+    "Plan a stroke test that determines friction well enough: valve_friction plan-test.",
 )
 _LACK_REMEDIES = {
     "RESULT": ("Identify the valve.",),
@@ -386,7 +386,7 @@ _LACK_REMEDIES = {
         "If it is healthy, set baseline_in_alarm of its identifier to true.",
     ),
 }
-_LET_IT_WORK = "Or leave the valve in service: its moves become a baseline in time."
+_LET_IT_WORK = "Or leave the valve in service: in time its moves will provide a baseline."
 
 
 def lack_remedies(lacks: Sequence[tuple[str, str]]) -> tuple[str, ...]:
@@ -711,7 +711,7 @@ _SENTENCES = {
     "{highest:g} Pa: check sensor and unit (Pa), or correct pressure_minimum and pressure_maximum",
     Code.POSITION_OUT_OF_RANGE: "{reading:.4g} m is outside the range of any valve, up to "
     "{highest:g} m: check sensor and unit (m)",
-    Code.NONE_USABLE: "no sample was usable yet",
+    Code.NONE_USABLE: "no sample has been usable yet",
     Code.LAST_USABLE: "the last usable one came {seconds:.0f} s ago",
     Code.STEPS_IGNORED: "the stem ignored {number} of the latest {steps} steps of its command of "
     "{least:percent} of the travel or more: {cause:of cause}",
@@ -763,11 +763,11 @@ _ADVICE = {
     ("friction_low", "ERROR"): "Look for leakage at the packing now.",
     ("stuck", ""): "Keep the loop in manual; stroke the valve locally, and check packing, trim and "
     "actuator.",
-    ("whole_valve", ""): "Check the part that is named at the next opportunity.",
+    ("whole_valve", ""): "Check the part named in the message at the next opportunity.",
     (
         "data_quality",
         "",
-    ): "Check the sensor and its connection; nobody watches the valve until then.",
+    ): "Check the sensor and its connection; the valve is not monitored until then.",
     ("positioner", ""): "Check the positioner and its air supply, and the tuning of the loop.",
 }
 

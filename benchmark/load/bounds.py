@@ -17,9 +17,10 @@ from playwright.sync_api import Browser
 
 from benchmark.harness.rows import Row, at_most
 from benchmark.load.plant import identifier_of
-from benchmark.load.stage import LIVE, Stage, Visit, pages_of, visit, wait_on_page
+from benchmark.load.stage import ALL_HEARD, LIVE, Stage, Visit, pages_of, visit, wait_on_page
 
 _READY = 1.0
+_ACKNOWLEDGED = 2.0
 _HEALED = 5.0
 _CORES = 0.25
 _MEMORY = 200.0
@@ -40,6 +41,19 @@ def _ready(browser: Browser, address: str, one: Visit, repeats: int) -> Iterator
             later.append(visit(context, address, one)[0])
     yield _row(f"{one.name}: ready, first visit", first, _READY)
     yield _row(f"{one.name}: ready, later visit", later, _READY)
+
+
+def _acknowledged(browser: Browser, stage: Stage, alarms: Visit) -> Row:
+    """Measure how long all alarms of the plant take to be acknowledged."""
+    with browser.new_context() as context:
+        page = visit(context, stage.address, alarms)[1]
+        page.get_by_role("button", name="Acknowledge all").click()
+        page.get_by_label("Your name").fill("A. Operator")
+        begin = time.monotonic()
+        page.get_by_role("button", name="Confirm").click()
+        wait_on_page(page, "!document.body.innerText.includes('unacknowledged')")
+        taken = time.monotonic() - begin
+    return at_most(f"{stage.valves} alarms acknowledged", taken, "s", _ACKNOWLEDGED)
 
 
 def _usage_rows(
@@ -63,11 +77,8 @@ def _usage_rows(
 
 def _healed(stage: Stage, launch: Callable[[], Browser], repeats: int) -> Iterator[Row]:
     """Measure restarts by kill -9, from the kill to the page that shows the new state."""
-    plant = pages_of(stage.valves, LIVE)[0]
-    is_live = (
-        f"{plant.is_ready} && window.did_handshake "
-        "&& !document.querySelector('.vf-is-silent, .vf-is-unheard')"
-    )
+    plant = Visit("plant", "/?sort=-tag", pages_of(stage.valves, LIVE)[0].is_ready)
+    is_live = f"{plant.is_ready} && window.did_handshake && {ALL_HEARD}"
     times: dict[str, list[float]] = {"identifier": [], "dashboard": [], "browser": []}
     started: list[float] = []
     for turn in range(repeats):
@@ -108,10 +119,12 @@ def bound_rows(
     stage.say("waiting for all valves")
     with browser.new_context() as context:
         page = visit(context, stage.address, visits[0])[1]
-        wait_on_page(page, "!document.querySelector('.vf-is-unheard')")
+        wait_on_page(page, ALL_HEARD)
     for one in visits:
         stage.say(f"opening {one.name}")
         yield from _ready(browser, stage.address, one, repeats)
+    stage.say("acknowledging all alarms")
+    yield _acknowledged(browser, stage, visits[-1])
     stage.say("what the dashboard takes")
     yield from _usage_rows(browser, stage, visits, seconds)
     browser.close()

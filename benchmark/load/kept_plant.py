@@ -16,7 +16,9 @@ from pathlib import Path
 
 from benchmark.load.plant import identifier_of, ratio_of, tag_of
 from valve_friction_ros.health import (
+    AlarmKind,
     Baseline,
+    Condition,
     Diagnosis,
     FrictionLimits,
     Level,
@@ -24,7 +26,7 @@ from valve_friction_ros.health import (
     StatusSignal,
     compared,
 )
-from valve_friction_ros.history import HistoryEntry, KeptValve
+from valve_friction_ros.history import HistoryEntry, HistoryFile, KeptValve, follow_alarms
 from valve_friction_ros.history.database import writing
 from valve_friction_ros.history.entry import Fit, Span, settings_text
 from valve_friction_ros.history.rows import insert_entry, valve_id
@@ -34,6 +36,7 @@ from valve_friction_ros.streams import DAY
 from valve_friction_ros.wording import quoted
 
 _EVERY = 7 * DAY
+_GROWN = Condition(Level.WARN, StatusSignal.MAINTENANCE_REQUIRED, "friction has grown")
 _SETTINGS = settings_text(MonitorSettings(BENCH_VALVE))
 
 
@@ -69,7 +72,7 @@ def _entry(
 
 
 def write_history(path: Path, valves: int, weeks: int = 52) -> None:
-    """Write a file of histories of valves, an identification a week each."""
+    """Write a file of histories of valves, an identification a week and an alarm each."""
     now = time.time_ns()
     with writing(path) as connection:
         for index in range(valves):
@@ -84,3 +87,6 @@ def write_history(path: Path, valves: int, weeks: int = 52) -> None:
                 friction = healthy * (1 + change * share) * chance.gauss(1.0, 0.01)
                 stamp = now - (weeks - week) * _EVERY
                 insert_entry(connection, number, _entry(valve, baseline, friction, stamp))
+    for index in range(valves):
+        valve = KeptValve(identifier_of(index), tag_of(index))
+        follow_alarms(HistoryFile(path), valve, {AlarmKind.FRICTION_HIGH: _GROWN}, now)

@@ -33,6 +33,11 @@ _ANSWER = 600.0
 _PATIENCE = 60.0
 _FIRST_SCREEN = 40
 """Rows that a tall screen shows at once."""
+ALL_HEARD = " && ".join(
+    f"document.querySelector('.vf-filter.vf-{one} .vf-count')?.innerText === '0'"
+    for one in ("silent", "unheard")
+)
+"""Whether a page of the plant counts no valve that is not heard."""
 _LOOK = """
 (() => {
   const look = () => {
@@ -141,20 +146,21 @@ class Visit:
 
 def pages_of(valves: int, identifier: str) -> tuple[Visit, ...]:
     """Return the pages with what each shows of so many valves, and of one of them."""
-    all_drawn = f"document.querySelectorAll('.vf-row, .vf-tile').length >= {valves}"
     node = quote(identifier)
     valve = (
         "document.querySelector('.vf-parameters') "
         "&& document.querySelector('.vf-chart-trend canvas')"
     )
-    first_screen = f"document.querySelectorAll('.vf-row').length >= {min(valves, _FIRST_SCREEN)}"
     compared = "document.querySelector('.vf-compared tbody')"
+    screen = min(valves, _FIRST_SCREEN)
+    plant = f"document.querySelectorAll('.vf-row, .vf-tile').length >= {screen}"
+    alarms = f"document.querySelectorAll('.vf-alarm-list tbody tr').length >= {screen}"
     return (
-        Visit("plant, table", "/", all_drawn),
-        Visit("plant, tiles", "/?view=tiles", all_drawn),
-        Visit("plant, first screen", "/", first_screen),
+        Visit("plant, table", "/", plant),
+        Visit("plant, tiles", "/?view=tiles", plant),
         Visit("valve", f"/valve?node={node}", valve),
         Visit("compare", f"/compare?a={node}&b={node}", compared),
+        Visit("alarms", "/alarms", alarms),
     )
 
 

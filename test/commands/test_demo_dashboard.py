@@ -104,7 +104,7 @@ def test_three_valves_their_verdicts_and_a_clean_end(demo):
         row.locator("a").click()
         page.locator(".vf-sentence").get_by_text("excess friction").wait_for()
         page.locator(".vf-chart-trend canvas").wait_for()
-        page.get_by_text("No sample has come yet.").wait_for(state="hidden")
+        page.get_by_text("No samples have been received yet.").wait_for(state="hidden")
     assert demo.said(r"(fv_103) \(leaking, F_c 90 N\): ERROR: friction collapsed")
     ends_clean(demo, signal.SIGINT)
 

@@ -63,7 +63,7 @@ class TestTable:
         assert "2026-09-21 14:13:20 80 3 weak OK friction normal: so" in lines
         (drift,) = (line for line in lines if "drifts" in line)
         assert drift.startswith("trend: coulomb friction drifts by +3.00 ± 0.")
-        assert drift.endswith("N a month, over 20 days")
+        assert drift.endswith("N per month, over 20 days")
         (limit,) = (line for line in lines if "expected on" in line)
         assert limit.startswith("trend: warn_ratio (176.2 N) expected on 2027-06-1")
 

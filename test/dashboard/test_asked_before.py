@@ -88,4 +88,4 @@ def test_a_remedy_is_said_once_and_moves_need_patience():
     assert len(told) == 2
     assert any("plan-test" in one for one in told)
     assert lack_remedies([*lacks, ("moves", "PRECISION")])[:2] == told
-    assert "its moves become a baseline" in lack_remedies([*lacks, ("moves", "VALUE")])[2]
+    assert "its moves will provide a baseline" in lack_remedies([*lacks, ("moves", "VALUE")])[2]

@@ -19,9 +19,11 @@ from valve_friction_ros.dashboard.history_cache import HistoryCache
 from valve_friction_ros.health import AlarmAction, AlarmKind, Condition, Level, StatusSignal
 from valve_friction_ros.history import (
     AlarmFilter,
+    History,
     HistoryFile,
     KeptValve,
     alarm_events,
+    copied,
     follow_alarms,
 )
 
@@ -98,3 +100,20 @@ def test_an_alarm_is_answered_in_the_file_under_the_name_of_the_account(tmp_path
     assert visit.called == []
     asyncio.run(guarded.call("/fv_2/identifier", request))
     assert [node for node, _ in visit.called] == ["/fv_2/identifier"]
+
+
+def test_an_alarm_on_a_server_is_answered_there_where_no_identifier_is_heard(tmp_path, database):
+    file, valve = HistoryFile(tmp_path / "history.sqlite"), KeptValve("/fv_1/identifier", "FV-1")
+    shown = Condition(Level.ERROR, StatusSignal.FAILURE, "excess friction")
+    follow_alarms(file, valve, {AlarmKind.FRICTION_HIGH: shown}, time.time_ns())
+    copied(file.path, database)
+    cache, visit = HistoryCache(database), Visit("anna", True)
+    cache._refresh()
+    request = request_of(Asked(AlarmAction.ACKNOWLEDGE, "bo"), "friction_high")
+
+    asyncio.run(HistoryOperator(cache, visit).call(valve.name, request))
+    assert [node for node, _ in visit.called] == [valve.name]
+    answer = asyncio.run(HistoryOperator(cache).call(valve.name, request))
+    assert answer == (True, "friction high: acknowledged")
+    newest = alarm_events(History(database), AlarmFilter())[0].event
+    assert (newest.action, newest.who) == (AlarmAction.ACKNOWLEDGE, "bo")

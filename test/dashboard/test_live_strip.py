@@ -76,7 +76,7 @@ class Clock:
 def test_the_axis_goes_on_when_the_samples_stop():
     clock = Clock()
     strip = LiveStrip(60.0, clock=clock)
-    assert strip.note() == "No sample has come yet."
+    assert strip.note() == "No samples have been received yet."
     for signal in (0, 1):
         strip.add(signal, np.array([1, 2, 3]) * SECOND, np.array([1.0, 2.0, 3.0]))
     clock.now += 1.0

@@ -69,10 +69,38 @@ def test_changes_since_the_baseline_have_their_intervals():
         }
     ).groups()
     assert shown["changes"] == (
-        ("lag", "0.01 (-0.02 to 0.04)", "s"),
+        ("lag", "0.010 (−0.020 to 0.040)", "s"),
         ("viscous asymmetry", "0.1", ""),
     )
     assert [one.name for one in shown["usage"]] == ["reversals"]
+
+
+def test_a_change_is_rounded_to_its_interval():
+    keys = ("asymmetry change [%]", "asymmetry change low [%]", "asymmetry change high [%]")
+    values = ("0.002098", "-0.09119", "0.09548")
+    shown = view(**dict(zip(keys, values, strict=True))).groups()["changes"]
+    assert shown == (("asymmetry", "0.002 (−0.091 to 0.095)", "%"),)
+
+
+@pytest.mark.parametrize(
+    ("of", "name", "value", "healthy"),
+    [
+        ("sliding_friction", "sliding_friction", 824.0, 301.0),
+        ("coulomb_friction", "coulomb_friction", 904.0, 290.0),
+        ("mass", "coulomb_friction", 904.0, 290.0),
+    ],
+)
+def test_the_friction_beside_a_ratio_is_the_one_that_it_is_of(of, name, value, healthy):
+    values = {"friction_ratio": "2.74", "friction_ratio of": of}
+    for one, now, before in (
+        ("coulomb_friction", "904", "290"),
+        ("sliding_friction", "824", "301"),
+    ):
+        values |= {f"{one} [N]": now, f"{one} half width [N]": "12", f"{one} verdict": "identified"}
+        values[f"baseline_{one} [N]"] = before
+    shown = view(**values)
+    assert (shown.friction.name, shown.friction.value) == (name, value)
+    assert shown.healthy.value == healthy
 
 
 def test_a_level_that_is_none_is_unknown():

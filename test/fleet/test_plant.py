@@ -34,7 +34,7 @@ from valve_friction_ros.dashboard import Plant, ServiceRequest
 from valve_friction_ros.dashboard.alarm_list import HistoryOperator
 from valve_friction_ros.dashboard.context import ValveFiles
 from valve_friction_ros.dashboard.history_cache import KeptValves
-from valve_friction_ros.dashboard.plant_rows import state_of
+from valve_friction_ros.dashboard.plant_rows import state_of, state_words
 from valve_friction_ros.fleet.job import kept_valve
 from valve_friction_ros.fleet.plant import read_plant, tags_in
 from valve_friction_ros.history import AlarmFilter, HistoryFile
@@ -191,6 +191,27 @@ def test_a_first_survey_ranks_by_the_dead_band_and_says_what_to_do(tmp_path, cap
     assert shares == pytest.approx(exact, rel=0.03)
 
 
+def test_the_class_of_the_packing_counts_in_the_history_and_on_its_page(tmp_path):
+    """A dead band of 27 % is bad for PTFE, and to be watched for graphite."""
+    (tmp_path / "valves.csv").write_text(TABLE)
+    (tmp_path / "exports").mkdir()
+    text = german(QUARTERS[0], *stroke(800.0, 1))
+    (tmp_path / "exports" / "FV-102.csv").write_text(text)
+    place, table = tmp_path / "history.sqlite", tmp_path / "survey.csv"
+    arguments = ["--plant", str(tmp_path / "valves.csv"), "--history", str(place), "--jobs", "1",
+                 "--output", str(table), "--time-zone", "Europe/Berlin", "--fix", "mass=1.6",
+                 "--packing", "graphite"]  # fmt: skip
+    assert run(["identify-folder", str(tmp_path / "exports"), *arguments]) == 0
+    with table.open() as stream:
+        assert [row["survey"] for row in csv.DictReader(stream)] == ["watch"]
+    (entry,) = entries(tmp_path, "FV-102")
+    assert entry.diagnosis.message.endswith("watch it, by the limits of the first survey")
+    valves = Plant(math.inf)
+    KeptValves(place, valves).refresh()
+    (shown,) = valves.valves(1e9)
+    assert state_words(shown) == "no baseline, watch"
+
+
 def test_the_reports_of_a_later_run_know_the_kept_baseline(plant, done, tmp_path):
     """Titled by the tag, in the stated zone, under a name that the dashboard finds."""
     assert done
@@ -284,7 +305,7 @@ class TestDashboard:
                     assert "1.79" in page.locator(".vf-row").first.inner_text()
                     assert "live" not in page.inner_text("table")
                     page.get_by_role("link", name="FV-101").click()
-                    page.get_by_text("N a month; excess expected").wait_for()
+                    page.get_by_text("N per month; excess expected").wait_for()
                     assert page.title() == "FV-101 · valve friction"
                     assert "2026-07-03 08:00:19 CEST" in page.inner_text("article")
                     assert not page.get_by_role("button", name="Identify").count()

@@ -15,6 +15,7 @@ import signal
 import sqlite3
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from pathlib import Path
 
@@ -291,6 +292,32 @@ def test_a_server_has_the_same(history, database):
     assert standing_alarms(History(database)) == standing_alarms(history)
     found = alarm_events(History(database), AlarmFilter(words="OPERATOR", area="/"))
     assert len(found) == 1
+
+
+def test_alarms_on_a_server_are_answered_once_unless_a_file_keeps_them(history, database):
+    """Of two who answer at once, one makes each step; a copy of what a file keeps has none."""
+    asked = [(KeptValve(f"/fv_{k}/identifier", f"FV-{k}"), HIGH) for k in range(40)]
+    for valve, _ in asked:
+        follow_alarms(history, valve, {HIGH: WARN}, START)
+    copied(history.path, database)
+    server, (kept, _) = History(database), asked[0]
+    with writing(database) as connection:
+        put(connection, tables.keeper, [{"valve_id": valve_id(connection, kept), "file": "x@y"}])
+    with ThreadPoolExecutor(2) as pool:
+        both = [
+            pool.submit(request_many, server, some, ACKNOWLEDGED, START + SECOND)
+            for some in (asked, asked[::-1])
+        ]
+        assert sum(one.result() for one in both) == 39
+    answered = [one for one in alarm_events(server) if one.event.who]
+    assert len({one.valve for one in answered}) == len(answered) == 39
+    with pytest.raises(AlarmError, match="a file keeps the alarms of /fv_0/identifier"):
+        request_alarms(server, kept, HIGH, ACKNOWLEDGED, START + SECOND)
+    (event,) = request_alarms(
+        server, asked[1][0], None, AlarmRequest(AlarmAction.COMMENT, "B", "repacked"), START + DAY
+    ).events
+    assert alarm_events(server)[0].event == event
+    assert read_alarms(server, kept.name)[HIGH].state is AlarmState.UNACKNOWLEDGED
 
 
 def test_five_hundred_are_acknowledged_at_once_and_their_nodes_learn_it(history):

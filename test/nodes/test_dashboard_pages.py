@@ -123,7 +123,7 @@ def test_a_letter_of_ne_107_filters_and_an_empty_table_says_so(tab):
     page.get_by_role("button", name="NE 107 S").click()
     wait_for_rows(page, 1)
     page.get_by_label("Search").fill("nothing is called so")
-    page.get_by_text("No valve meets the filters.").wait_for()
+    page.get_by_text("No valve matches the filters.").wait_for()
 
 
 def test_only_what_changes_is_sent(tab):
@@ -204,10 +204,10 @@ def test_text_from_outside_is_never_markup(tab, path):
 
 def test_an_address_is_text_from_outside_too(tab):
     page = tab.open(f"/valve?node={quote('/<img src=x onerror=alert(2)>')}&tz=<b>&theme=<i>")
-    page.get_by_text("No message of this valve has been heard.").wait_for()
+    page.get_by_text("No message has been received from this valve.").wait_for()
     assert page.locator("img[src=x]").count() == 0
     page = tab.open("/?q=%22%3E%3Cscript%3Ealert(3)%3C/script%3E&sort=%3Cb%3E")
-    page.get_by_text("No valve meets the filters.").wait_for()
+    page.get_by_text("No valve matches the filters.").wait_for()
 
 
 # Valve: one after the other, as a person works with it
@@ -299,7 +299,7 @@ def test_a_baseline_is_set_only_when_it_is_agreed(tab):
     page.locator(".vf-parameters").wait_for()
     page.get_by_role("button", name="Set baseline …").click()
     asked = page.locator(".vf-dialog")
-    asked.get_by_text("in force now").wait_for()
+    asked.get_by_text("current", exact=True).wait_for()
     words = asked.inner_text()
     assert "none" in words
     assert "coulomb friction 152" in words
@@ -365,9 +365,9 @@ def test_signals_are_heard_while_the_page_is_open(identified, tab):
     client.wait_until(lambda: client.node.count_subscribers(topic) == 1, "no other listener")
     page = tab.open(VALVE)
     client.wait_until(lambda: client.node.count_subscribers(topic) == 2, "the dashboard's ear")
-    page.get_by_text("No sample has come yet.").wait_for()
+    page.get_by_text("No samples have been received yet.").wait_for()
     client.send_record(quick_record(HIGH_FRICTION), START + 60 * SECOND)
-    page.get_by_text("No sample has come yet.").wait_for(state="hidden")
+    page.get_by_text("No samples have been received yet.").wait_for(state="hidden")
     page.goto("about:blank")
     client.wait_until(lambda: client.node.count_subscribers(topic) == 1, "the end of it")
 
@@ -402,7 +402,7 @@ def test_axe_finds_nothing_wrong_with_what_is_known_of_a_valve(tab, theme):
     page.evaluate("document.querySelectorAll('details').forEach(one => one.open = true)")
     assert axe_violations(page) == []
     page.get_by_role("button", name="Set baseline …").click()
-    page.locator(".vf-dialog").get_by_text("in force now").wait_for()
+    page.locator(".vf-dialog").get_by_text("current", exact=True).wait_for()
     assert axe_violations(page) == []
     page.get_by_role("button", name="Cancel").click()
     page = tab.open(f"/compare?a={quote(NODE)}&b={quote(NODE)}&theme={theme}")
@@ -439,20 +439,28 @@ def test_an_alarm_is_acknowledged_with_a_name_and_exported(identified, tab):
     identified.client.set_parameters(NODE, {"baseline_coulomb_friction": float("nan")})
 
 
-def test_of_many_alarms_those_near_the_view_are_drawn(plant, tab):
+@pytest.mark.parametrize(
+    ("path", "line"),
+    [
+        ("/alarms?area=/many", ".vf-alarm-list tbody tr"),
+        ("/?q=/many", ".vf-row"),
+        ("/?q=/many&view=tiles", ".vf-tile"),
+    ],
+)
+def test_of_many_those_near_the_view_are_drawn(plant, tab, path, line):
     """All come as the page is scrolled."""
     history = HistoryFile(plant.folder / "valve_friction_ros" / "history.sqlite")
     shown = Condition(Level.ERROR, StatusSignal.FAILURE, "excess friction")
     for number in range(400):
         valve = KeptValve(f"/many/fv_{number}/identifier", f"MANY-{number}")
         follow_alarms(history, valve, {AlarmKind.FRICTION_HIGH: shown}, time.time_ns())
-    page = tab.open("/alarms?area=/many")
-    lines = page.locator(".vf-alarm-list tbody tr")
+    page = tab.open(path)
+    lines = page.locator(line)
     page.get_by_text("more below").wait_for()
     assert 0 < lines.count() < 400
     while (count := lines.count()) < 400:
         page.mouse.wheel(0, 20_000)
-        page.wait_for_function(f"document.querySelectorAll('tbody tr').length > {count}")
+        page.wait_for_function(f"document.querySelectorAll('{line}').length > {count}")
     page.get_by_text("more below").wait_for(state="detached")
 
 

@@ -191,7 +191,7 @@ def test_damaged_messages():
     bench.quality.see(Arrivals.joined(()), intake, 0.0)
     (found,) = bench.faults()
     assert found == DataFault(REJECTED, Signal.POSITION, SampleFault.DAMAGED)
-    assert "no sample was usable yet: they are damaged" in str(found.statement(BENCH_VALVE))
+    assert "no sample has been usable yet: they are damaged" in str(found.statement(BENCH_VALVE))
     assert sum(bench.buffer.rejected.values()) == 3
 
 

@@ -369,7 +369,7 @@ def _trend_lines(trend: Trend | None) -> list[str]:
         return [f"trend: no significant drift of {trend.what} over {days}"]
     lines = [
         f"trend: {trend.what} drifts by {'+' * (trend.drift > 0)}"
-        f"{with_width(trend.drift, trend.half_width)} N a month, over {days}"
+        f"{with_width(trend.drift, trend.half_width)} N per month, over {days}"
     ]
     if trend.crossing is not None:
         expected, earliest, latest = (

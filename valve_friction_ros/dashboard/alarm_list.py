@@ -192,7 +192,7 @@ def areas_of(valves: Iterable[str]) -> tuple[str, ...]:
 
 
 class HistoryOperator:
-    """Answers alarms in the file of the history, which their identifiers follow.
+    """Answers alarms in the history, of which identifiers follow the file.
 
     An identifier that shares its process with many valves offers no services for that.
 
@@ -201,8 +201,8 @@ class HistoryOperator:
     history : HistoryCache
         The history.
     services : Operator or None
-        Calls the services of identifiers: for all else, and for the alarms of valves that the file
-        does not keep. None: no identifier is heard.
+        Calls the services of identifiers: for all else, and for the alarms of valves that no file
+        here keeps. None: no identifier is heard.
     """
 
     def __init__(self, history: HistoryCache, services: Operator | None = None) -> None:
@@ -213,14 +213,14 @@ class HistoryOperator:
         history, called = self._history, (request.name, request.switch)
         action = next((action for action, one in _SERVICES.items() if one == called), None)
         kept = next((one for one in history.valves if one.name == node), None)
-        if action is None or kept is None or not history.is_file:
-            if self._services is not None:
-                return await self._services.call(node, request)
+        if self._services is not None and (action is None or kept is None or not history.is_file):
+            return await self._services.call(node, request)
+        if action is None or kept is None:
             if action is None:
-                return Answer(False, "no identifier is asked: this dashboard shows a history alone")
-            if kept is None:
-                return Answer(False, f"{node}: the history has no such valve")
-            return Answer(False, "the history is on a server: ask the identifier of the valve")
+                return Answer(
+                    False, "this dashboard shows only a history: there is no identifier to ask"
+                )
+            return Answer(False, f"{node}: the history has no such valve")
         kind, hours = request.values["alarm_kind"], request.values["alarm_hours"]
         try:
             asked = AlarmRequest(

@@ -232,7 +232,7 @@ class DashboardContext:
     async def answer_alarms(
         self, alarms: Sequence[tuple[KeptValve, AlarmKind]], request: AlarmRequest
     ) -> Answer:
-        """Make a request on many alarms at once, in the file that their identifiers follow."""
+        """Make a request on many alarms at once, in the history."""
         if not self.visitors.may_operate():
             return Answer(False, NOT_ALLOWED)
         name = self.visitors.name() or request.who

@@ -34,11 +34,9 @@ from valve_friction_ros.health import (
     dead_band,
     dead_band_half_width,
 )
-from valve_friction_ros.health.diagnosis import survey_of
 from valve_friction_ros.history import (
     AlarmFilter,
     HistoryError,
-    HistoryFile,
     KeptAlarmEvent,
     KeptValve,
     Place,
@@ -233,26 +231,26 @@ class HistoryCache:
         return self._path is not None
 
     def answer(self, alarms: Sequence[tuple[KeptValve, AlarmKind]], request: AlarmRequest) -> int:
-        """Make a request on many alarms in the file; return of how many it was kept.
+        """Make a request on many alarms; return of how many it was kept.
 
-        Raises HistoryError if there is none, or it cannot be written.
+        Raises HistoryError if there is no history, or it cannot be written.
         """
-        return database.request_many(self._written_file(), alarms, request, time.time_ns())
+        return database.request_many(self._written(), alarms, request, time.time_ns())
 
     def answer_valve(
         self, valve: KeptValve, kind: AlarmKind | None, request: AlarmRequest
     ) -> tuple[Alarm, ...]:
-        """Make a request on one alarm of a valve in the file, or on all; return them as they are.
+        """Make a request on one alarm of a valve, or on all; return them as they are.
 
         Raises AlarmError if that is not possible now, and HistoryError as `answer` does.
         """
-        steps = database.request_alarms(self._written_file(), valve, kind, request, time.time_ns())
+        steps = database.request_alarms(self._written(), valve, kind, request, time.time_ns())
         return tuple(one.alarm for one in steps.events)
 
-    def _written_file(self) -> HistoryFile:
-        if self._path is None:
-            raise HistoryError("the history is no file of this machine: ask each identifier")
-        return HistoryFile(self._path)
+    def _written(self) -> database.History:
+        if self._file is None:
+            raise HistoryError("no history_file is named: nothing is kept")
+        return self._file
 
     def spark(self, node: str) -> Sparkline | None:
         """Return the picture of a valve's ratios, if there are some."""
@@ -307,11 +305,10 @@ def _status_of(kept: ValveHistory, alarms: Mapping[AlarmKind, Alarm]) -> Status:
         band, half_width = dead_band(found, valve), dead_band_half_width(found, valve)
         values["estimate_time"] = exact_time(found.time)
         values |= result_values(found.to_dict(), band, half_width)
-        survey = survey_of(found, valve)
-        if kept.set_baseline is None and survey is not Survey.UNKNOWN:
-            values["survey"] = survey.value
     baseline = None if kept.set_baseline is None else kept.set_baseline.baseline
     values |= baseline_values(baseline)
+    if baseline is None and diagnosis.survey is not Survey.UNKNOWN:
+        values["survey"] = diagnosis.survey.value
     values |= ratio_values(diagnosis.ratio)
     values |= trend_values(kept.trend)
     values |= alarm_values(alarms)

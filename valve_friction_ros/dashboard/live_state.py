@@ -28,7 +28,7 @@ from valve_friction_ros.health import (
 )
 from valve_friction_ros.outside_text import printable
 from valve_friction_ros.settings import ALARM_KINDS
-from valve_friction_ros.wording import alarm_advice
+from valve_friction_ros.wording import alarm_advice, number_and_width
 
 _KEY = re.compile(r"(?P<name>.*?)(?: \[(?P<unit>[^\]]*)\])?")
 _LONGEST_TEXT = 400
@@ -133,14 +133,18 @@ _STARTS = {
 
 
 def _with_intervals(changes: tuple[Entry, ...]) -> tuple[Entry, ...]:
-    """Write each change since the baseline with its interval, in one entry."""
-    texts = {one.name: one.text for one in changes}
+    """Write each change since the baseline with its interval, rounded to it, in one entry."""
+    numbers = {one.name: number(one.text) for one in changes}
     found = []
     for name, text, unit in changes:
-        if not name.endswith((" low", " high")):
-            ends = [texts[f"{name} {end}"] for end in ("low", "high") if f"{name} {end}" in texts]
-            between = f" ({' to '.join(ends)})" if len(ends) == 2 else ""
-            found.append(Entry(name.removesuffix(_CHANGE), text + between, unit))
+        if name.endswith((" low", " high")):
+            continue
+        ends = [numbers.get(f"{name} {end}", math.nan) for end in ("low", "high")]
+        half_width, words = 0.5 * (ends[1] - ends[0]), text
+        if math.isfinite(half_width):
+            some = (number_and_width(one, half_width)[0] for one in (numbers[name], *ends))
+            words = "{} ({} to {})".format(*some)
+        found.append(Entry(name.removesuffix(_CHANGE), words, unit))
     return tuple(found)
 
 
@@ -334,10 +338,22 @@ class ValveView:
 
     @property
     def friction(self) -> Quantity:
-        """The Coulomb friction; the sliding friction where the record determines that alone."""
-        coulomb = self.parameter("coulomb_friction").if_determined
-        sliding = self.parameter("sliding_friction").if_determined
-        return sliding if sliding.is_known and not coulomb.is_known else coulomb
+        """The friction that the ratio is of.
+
+        Without a ratio the Coulomb friction, or the sliding friction where the record determines
+        that alone.
+        """
+        compared = "" if self.ratio is None else self.ratio.of
+        names = sorted(("coulomb_friction", "sliding_friction"), key=lambda one: one != compared)
+        first, second = (self.parameter(name).if_determined for name in names)
+        return second if second.is_known and not first.is_known else first
+
+    @property
+    def healthy(self) -> Quantity:
+        """The same friction of the baseline, without a value where it has none."""
+        name = self.friction.name
+        found = (one for one in self.baseline if one.name == name)
+        return next(found, Quantity(name, math.nan))
 
 
 _LACKING = ("coulomb_friction", "sliding_friction", "moves", "result", "valve")

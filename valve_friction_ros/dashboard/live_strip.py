@@ -151,7 +151,7 @@ class LiveStrip:
             return self.trouble
         pressure, stem = self._arrivals
         if pressure is None and stem is None:
-            return "No sample has come yet."
+            return "No samples have been received yet."
         if (still := self._still()) > _STILL:
             return f"no sample for {still:.0f} s"
         late = [

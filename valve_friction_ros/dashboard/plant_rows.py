@@ -216,7 +216,8 @@ SIGNAL_WORDS = {
     "": "good",
 }
 _SHORT = {"F": "failure", "C": "check", "S": "out of spec", "M": "maintenance"}
-_FRICTIONS = {"coulomb_friction": "F_c", "sliding_friction": "sliding"}
+FRICTIONS = {"coulomb_friction": "F_c", "sliding_friction": "sliding"}
+"""What a friction is called beside its number."""
 
 Row = dict[str, Any]
 """A row under fixed keys: no key is ever a text from outside."""
@@ -297,13 +298,14 @@ def row_of(valve: Heard, spark: Sparkline | None, wall: float, href: str) -> Row
         "state": state_of(valve),
         "ne": "" if valve.is_silent else view.signal.value,
         "word": state_words(valve),
+        "advice": "" if valve.is_silent else view.advice,
         "say": view.sentence[:_SAY] or ("no message has been heard" if valve.is_silent else ""),
         **_ratio(view.ratio),
         "dead": dead,
         "deadw": dead_width,
         "fc": value,
         "fcw": width,
-        "fcof": _FRICTIONS[friction.name] if friction.is_known else "",
+        "fcof": FRICTIONS[friction.name] if friction.is_known else "",
         "drift": drift_number(drift) if drift else "–",
         "expected": f"limit {drift.expected.date}" if drift and drift.expected else "",
         "spark": spark.path if spark else "",

@@ -84,22 +84,25 @@ class Filing:
         The result, without its pictures; its record is thinned.
     method : str
         Name of the method.
+    limits : FrictionLimits
+        Limits of its diagnosis.
     """
 
     recording: str
     tag: str
     result: Result
     method: str
+    limits: FrictionLimits
 
     @classmethod
-    def of(cls, recording: str, tag: str, result: Result, method: str) -> "Filing | None":
+    def of(cls, recording: str, options: "Options", result: Result) -> "Filing | None":
         """Return what is filed of a result; None where its record has no date."""
-        if not tag or result.recording.start_time < DATED:
+        if not options.tag or result.recording.start_time < DATED:
             return None
         light = copy.copy(result)
         object.__setattr__(light, "stem", None)
         object.__setattr__(light, "exhibit", None)
-        return cls(recording, tag, light, method)
+        return cls(recording, options.tag, light, options.method, options.limits)
 
     @property
     def span(self) -> Span:
@@ -159,11 +162,12 @@ class _Alarms:
         }
         self._hold = FrictionHold(shown, None if last is None else last.time)
 
-    def follow(self, diagnosis: Diagnosis, findings: Iterable[Finding], time: int) -> None:
-        """Take the diagnosis of a record that ended at a time, ns."""
+    def follow(self, diagnosis: Diagnosis, findings: Iterable[Finding], filing: Filing) -> None:
+        """Take the diagnosis of a record, which is of the time at which the record ended."""
+        time = filing.span.end
         if self._hold.until is not None and time <= self._hold.until:
             return
-        self._hold = replace(self._hold.looked(diagnosis, time, FrictionLimits()), until=time)
+        self._hold = replace(self._hold.looked(diagnosis, time, filing.limits), until=time)
         conditions = {kind: self._hold.conditions[side] for side, kind in ALARM_OF_SIDE.items()}
         conditions[AlarmKind.WHOLE_VALVE] = shown_by(findings)
         follow_alarms(self._history, self._valve, conditions, time)
@@ -216,7 +220,7 @@ def file_results(place: Path, filings: Iterable[Filing], first_is_baseline: bool
             in_force[one.tag] = _begin(history, valve, one)
             begun += [one.tag] if in_force[one.tag] is not None else []
         baseline = in_force[one.tag]
-        diagnosis, findings = diagnose_valve(one.result, baseline)
+        diagnosis, findings = diagnose_valve(one.result, baseline, one.limits)
         cells[one.recording, one.tag] = diagnosis_cells(diagnosis, findings)
         if (one.tag, one.span.begin // 10**9) in before:
             known += 1
@@ -235,7 +239,7 @@ def file_results(place: Path, filings: Iterable[Filing], first_is_baseline: bool
                 span=one.span,
                 method=result.method,
                 diagnosis=diagnosis,
-                limits=FrictionLimits(),
+                limits=one.limits,
                 baseline=baseline,
                 settings=settings_text(settings),
                 parameters=result.parameters,
@@ -249,7 +253,7 @@ def file_results(place: Path, filings: Iterable[Filing], first_is_baseline: bool
                 numbers=valve_numbers(result),
             )
         )
-        alarms[one.tag].follow(diagnosis, findings, one.span.end)
+        alarms[one.tag].follow(diagnosis, findings, one)
     return Filed(len(ordered) - known, known, tuple(begun), cells)
 
 
@@ -361,7 +365,7 @@ def _cells(job: Job, recorded: RecordedValve) -> Mapping[str, Cell]:
     diagnosis, found = diagnose_valve(result, baseline, options.limits)
     cells: dict[str, Any] = result_cells(name, result, diagnosis, recorded.notes, found)
     if job.is_filed:
-        cells[FILING] = Filing.of(job.name, options.tag, result, options.method)
+        cells[FILING] = Filing.of(job.name, options, result)
     return {**cells, **_report(job, recorded, result, baseline)}
 
 

@@ -304,7 +304,7 @@ class AlarmRequest:
                 raise AlarmError(f"{name} must be one line of at most {longest} characters")
             object.__setattr__(self, name, given)
         if not self.who:
-            raise AlarmError("who is empty: give the name of the person who does it")
+            raise AlarmError("who is empty: give your name")
         if self.action is AlarmAction.COMMENT and not self.text:
             raise AlarmError("text is empty: give the comment")
         if (longest_time := _LONGEST.get(self.action)) is None:

@@ -196,8 +196,6 @@ class Diagnosis:
         The alarm of an earlier record that stands.
     latest : Diagnosis or None
         What the record itself says, where an alarm stands.
-    survey : Survey
-        What a first survey says of a valve without a baseline.
     """
 
     level: Level
@@ -208,7 +206,6 @@ class Diagnosis:
     doubt: Statement | None = None
     alarm: StandingAlarm | None = None
     latest: "Diagnosis | None" = None
-    survey: Survey = Survey.UNKNOWN
 
     @classmethod
     def of(
@@ -221,6 +218,14 @@ class Diagnosis:
     def message(self) -> str:
         """What is found in one sentence."""
         return sentence(self.statement)
+
+    @property
+    def survey(self) -> Survey:
+        """What a first survey says of a valve without a baseline."""
+        told = self.statement
+        while isinstance(inner := told.facts.get("of"), Statement):
+            told = inner
+        return Survey[told.facts.get("survey", Survey.UNKNOWN.name)]
 
     @property
     def own(self) -> "Diagnosis":
@@ -481,7 +486,7 @@ def _by_size(
     if baseline is None:
         survey = survey_of(result, valve, limits.survey)
         first = said(Code.NO_BASELINE, effect=effect, survey=survey.name)
-        return replace(Diagnosis.of(FrictionState.UNKNOWN, first), survey=survey)
+        return Diagnosis.of(FrictionState.UNKNOWN, first)
     reasons = tuple(_why_not_compared(one, result, baseline) for one in _frictions(result))
     why = said(Code.NOT_COMPARED, baseline=baseline.statement, reasons=reasons, effect=effect)
     return Diagnosis.of(FrictionState.UNKNOWN, why)

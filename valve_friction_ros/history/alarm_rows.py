@@ -20,7 +20,7 @@ import math
 import threading
 import uuid
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -32,6 +32,7 @@ from valve_friction_ros.health.alarms import (
     TRANSITIONS,
     Alarm,
     AlarmAction,
+    AlarmError,
     AlarmEvent,
     AlarmKind,
     AlarmRequest,
@@ -141,14 +142,28 @@ class AlarmSteps(NamedTuple):
     alarms: Mapping[AlarmKind, Alarm]
 
 
+def _unkept(connection: Connection, valves: Collection[int]) -> set[int]:
+    """Return the valves whose alarms no file keeps; nobody else writes them to a server meanwhile.
+
+    What a server has of the others is a copy, and the file would not learn of a step that it lacks.
+    """
+    if connection.dialect.name != "postgresql":
+        return {*valves}
+    row, keeper = tables.valve.c.id, tables.keeper.c.valve_id
+    connection.execute(sa.select(row).where(row.in_(valves)).order_by(row).with_for_update())
+    return {*valves} - {*connection.scalars(sa.select(keeper).where(keeper.in_(valves)))}
+
+
 def _kept(
-    file: HistoryFile,
+    history: History,
     valve: KeptValve,
     days: float,
     steps: Callable[[Mapping[AlarmKind, Alarm]], tuple[AlarmEvent, ...]],
 ) -> AlarmSteps:
-    with writing(file.path) as connection:
+    with writing(history.place) as connection:
         number = valve_id(connection, valve)
+        if number not in _unkept(connection, [number]):
+            raise AlarmError(f"a file keeps the alarms of {valve.name}: ask its identifier")
         alarms = _alarms_of(connection, number)
         events = steps(alarms)
         put(connection, _EVENT, [_row(number, one) for one in events], is_kept=True)
@@ -174,7 +189,7 @@ def follow_alarms(
 
 
 def request_alarms(
-    file: HistoryFile,
+    history: History,
     valve: KeptValve,
     kind: AlarmKind | None,
     request: AlarmRequest,
@@ -183,28 +198,31 @@ def request_alarms(
 ) -> AlarmSteps:
     """Keep what a person asks of one alarm of a valve, or of all (`all_requested`).
 
-    Raises AlarmError if that is not possible now; nothing is kept then.
+    Raises AlarmError if that is not possible now, or on a server that has a copy of what an
+    identifier keeps in its file; nothing is kept then.
     """
-    return _kept(file, valve, days, lambda alarms: all_requested(alarms, kind, request, time))
+    return _kept(history, valve, days, lambda alarms: all_requested(alarms, kind, request, time))
 
 
 def request_many(
-    file: HistoryFile,
+    history: History,
     asked: Sequence[tuple[KeptValve, AlarmKind]],
     request: AlarmRequest,
     time: int,
 ) -> int:
     """Keep what a person asks of many alarms, in one transaction; return of how many it was kept.
 
-    Those that do not allow it now are left out. Identifiers that run see it by `AlarmFeed`.
+    Those that do not allow it now are left out, and those that `request_alarms` refuses on a
+    server. Identifiers that run see it by `AlarmFeed`.
     """
-    with writing(file.path) as connection:
+    with writing(history.place) as connection:
         numbers = {valve: valve_id(connection, valve) for valve in {one for one, _ in asked}}
-        alarms = _alarms(connection, numbers.values())
+        unkept = _unkept(connection, numbers.values())
+        alarms = _alarms(connection, unkept)
         written = []
         for valve, kind in dict.fromkeys(asked):
             alarm = alarms.get((numbers[valve], kind), Alarm(kind))
-            if (alarm.state, request.action) in TRANSITIONS:
+            if numbers[valve] in unkept and (alarm.state, request.action) in TRANSITIONS:
                 written.append(_row(numbers[valve], requested(alarm, request, time)))
         put(connection, _EVENT, written, is_kept=True)
     return len(written)

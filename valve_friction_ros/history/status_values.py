@@ -31,7 +31,7 @@ def ratio_values(ratio: Ratio | None, prefix: str = "") -> dict[str, str]:
         f"{prefix}friction_ratio": number_text(ratio.value),
         f"{prefix}friction_ratio low": number_text(ratio.low),
         f"{prefix}friction_ratio high": number_text(ratio.high),
-        f"{prefix}friction_ratio of": ratio.what,
+        f"{prefix}friction_ratio of": ratio.of,
     }
 
 

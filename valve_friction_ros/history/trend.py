@@ -367,7 +367,7 @@ def trend_of(
 def drift_text(trend: Trend) -> str:
     """Return the drift with its interval, and when a limit is expected to be crossed."""
     value, width = number_and_width(trend.drift, trend.half_width)
-    text = f"{'+' if trend.drift > 0 else ''}{value} {width} N a month"
+    text = f"{'+' if trend.drift > 0 else ''}{value} {width} N per month"
     if trend.crossing is None:
         return text
     when = utc(trend.crossing.time)

@@ -359,7 +359,7 @@ def _history_copy(parser: argparse.ArgumentParser) -> None:
 def _dashboard(parser: argparse.ArgumentParser) -> None:
     parser.description = (
         "Serve the pages of a history: plant, valve, alarms and comparison. It needs no ROS and "
-        "shows no live values; alarms in a history file can be answered. The node `dashboard` also "
+        "shows no live values; alarms can be answered. The node `dashboard` also "
         "shows what the identifiers report now."
     )
     parser.epilog = (

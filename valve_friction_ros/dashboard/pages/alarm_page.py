@@ -69,10 +69,10 @@ async def asked_of_person(
     def draw() -> None:
         names = {one.name: ACTIONS[one] for one in actions}
         action = ui.select(names, value=(chosen or actions[0]).name, label="Action")
-        hours = ui.number("For hours", value=8.0, min=0.1, max=8784, step=1)
+        hours = ui.number("Duration, hours", value=8.0, min=0.1, max=8784, step=1)
         who = ui.input("Your name", value=name)
         who.set_enabled(not name)
-        made.extend((action, who, ui.input("Words for the record"), hours))
+        made.extend((action, who, ui.input("Comment"), hours))
         for one in made:
             one.classes("vf-select")
 
@@ -105,8 +105,8 @@ class _AlarmPage:
         may, one = self._context.visitors.may_operate(), self._selection
         with element("section", "vf-head", aria_label="Filters"):
             self._title = text("h1", "Alarms", "vf-title")
-            search_field("Search tag, sentence, person", one.search, self._select)
-            lists = {False: "alarms that stand", True: "all events"}
+            search_field("Search tag, message, person", one.search, self._select)
+            lists = {False: "current alarms", True: "alarm history"}
             self._choice("List", lists, "is_journal")
             spans = {name: f"last {name}" for name in RANGES} | {ALL: "all time"}
             self._choice("Time", spans, "span")
@@ -180,7 +180,7 @@ class _AlarmPage:
             )
             for k, each in enumerate(self._events)
         ]
-        empty = "No alarm meets the filters." if one.to_query() else "No alarm stands."
+        empty = "No alarm matches the filters." if one.to_query() else "No current alarms."
         self._table.send({"rows": rows, "journal": one.is_journal, "empty": empty})
         waiting = sum(each.event.alarm.state.needs_answer for each in self._events)
         more = f"The newest {MOST_ROWS} are shown; the CSV has all." * (len(events) > MOST_ROWS)
@@ -216,7 +216,7 @@ class _AlarmPage:
         found = await asked_of_person(title, only, self._context.visitors.name())
         if found is None:
             return
-        if not self._context.history.is_file:
+        if self._context.is_live and not self._context.history.is_file:
             await self._call([(o.valve.name, o.event.alarm.kind.value) for o in some], found)
             return
         try:
@@ -289,7 +289,7 @@ class AlarmStates:
 
     def _draw_alarms(self, alarms: Sequence[ValveAlarm]) -> None:
         if not alarms:
-            text("p", "No alarm stands.", "vf-none")
+            text("p", "No current alarms.", "vf-none")
         for one in alarms:
             self._draw_alarm(one)
 

@@ -51,7 +51,7 @@ export default {
       if (this.$refs.end) this.eye.observe(this.$refs.end);
     },
     update(news) {
-      this.rows = news.rows.map(Object.freeze);
+      this.rows = Vue.toRaw(news).rows.map(Object.freeze);
       this.journal = news.journal;
       this.empty = news.empty;
     },

@@ -63,7 +63,7 @@ _COLUMNS = [
     for key, title, unit, sort in (
         ("state", "State", "", "worst"),
         ("tag", "Valve", "", "tag"),
-        ("say", "Diagnosis", "", ""),
+        ("say", "What to do, diagnosis", "", ""),
         ("ratio", "Ratio", "÷ baseline", "ratio"),
         ("dead", "Dead band", "%", "dead_band"),
         ("fc", "Friction", "N", "friction"),
@@ -76,8 +76,8 @@ _COLUMNS = [
 
 
 _NONE_YET = {
-    True: "No valve has been heard yet: start an identifier in this ROS domain.",
-    False: "The history holds no valve yet: `identify-folder --history` files results in it.",
+    True: "No message from a valve yet: start an identifier in this ROS domain.",
+    False: "The history contains no valves yet: `identify-folder --history` adds results to it.",
 }
 
 
@@ -160,7 +160,7 @@ class _PlantPage:
             "sort": one.sort,
             "reversed": one.is_reversed,
             "tiled": one.is_tiled,
-            "empty": "No valve meets the filters."
+            "empty": "No valve matches the filters."
             if one.search or one.states or one.signals
             else _NONE_YET[self._context.is_live],
         }
@@ -314,7 +314,7 @@ class _ComparePage:
         self, one: ComparedIdentification | None, other: ComparedIdentification | None
     ) -> None:
         if one is None or other is None:
-            text("p", "Choose a valve on both sides.", "vf-none")
+            text("p", "Choose a valve for each side.", "vf-none")
             return
         with element("table", "vf-list vf-compared"):
             sides = ("A", "B", "B ÷ A")

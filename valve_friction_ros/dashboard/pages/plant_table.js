@@ -1,6 +1,8 @@
 // The valves of a plant as a table or as tiles. The server sends rows that have changed, the order,
 // and its clock; ages are counted here, so they grow on where the connection is lost.
-// All text goes into text nodes and attributes by Vue's bindings, never into markup.
+// All text goes into text nodes and attributes by Vue's bindings, never into markup. Only rows near
+// the view are drawn: more come as it is scrolled.
+const STEP = 60;
 const UNITS = [[86400 * 365.25, "y"], [86400, "d"], [3600, "h"], [60, "min"]];
 
 function age(seconds) {
@@ -19,7 +21,7 @@ export default {
   template: `
   <div class="vf-plant" @keydown="move">
     <p class="vf-lost" v-if="lost > 4" role="alert">
-      No connection to the dashboard for {{ age(lost) }}: what is shown is as old.
+      No connection to the dashboard for {{ age(lost) }}: the values shown are that old.
     </p>
     <table v-if="!tiled" class="vf-table">
       <thead><tr>
@@ -35,11 +37,11 @@ export default {
         </th>
       </tr></thead>
       <tbody>
-        <tr v-for="row in shown" :key="row.i" :class="'vf-row vf-is-' + row.state"
+        <tr v-for="row in near" :key="row.i" :class="'vf-row vf-is-' + row.state"
             v-memo="[row, since(row), heard(row)]" @click="open($event, row)">
           <td class="vf-c-state">${CELLS}</td>
           <td class="vf-c-tag"><a :href="row.href">{{ row.tag }}</a><small>{{ row.place }}</small></td>
-          <td class="vf-c-say"><span :title="row.say">{{ row.say }}</span></td>
+          <td class="vf-c-say"><b v-if="row.advice">{{ row.advice }}</b><span :title="row.say">{{ row.say }}</span></td>
           <td class="vf-c-ratio vf-n" data-label="friction ratio">
             <span class="vf-bar" aria-hidden="true"><i v-if="row.bar"
               :style="{left: row.bar[1] + '%', right: 100 - row.bar[2] + '%'}"></i><u v-if="row.bar"
@@ -50,17 +52,17 @@ export default {
           <td class="vf-c-trend"><svg v-if="row.spark" viewBox="0 0 100 24" preserveAspectRatio="none"
               role="img" :aria-label="'friction ratio of the last ' + row.days + ' days'">
               <path class="vf-one" :d="row.base"/><path :d="row.spark"/></svg><small>{{ row.expected }}</small></td>
-          <td class="vf-c-drift vf-n" data-label="drift, N a month"><b>{{ row.drift }}</b></td>
+          <td class="vf-c-drift vf-n" data-label="drift, N per month"><b>{{ row.drift }}</b></td>
           <td class="vf-c-age vf-n" data-label="identified">{{ since(row) }}</td>
           <td v-if="live" class="vf-c-heard vf-n" data-label="heard">{{ heard(row) }}</td>
         </tr>
       </tbody>
     </table>
     <ul v-else class="vf-tiles">
-      <li v-for="row in shown" :key="row.i" v-memo="[row, since(row), heard(row)]">
+      <li v-for="row in near" :key="row.i" v-memo="[row, since(row), heard(row)]">
         <a :href="row.href" class="vf-tile" :class="'vf-is-' + row.state">
           <span class="vf-tile-head"><strong>{{ row.tag }}</strong>${CELLS}</span>
-          <span class="vf-tile-say">{{ row.say }}</span>
+          <span class="vf-tile-say"><b v-if="row.advice">{{ row.advice }}</b> {{ row.say }}</span>
           <span class="vf-tile-foot vf-n"><b>{{ row.ratio === "–" ? "" : "× " + row.ratio }}</b>
             <small>{{ row.between }}</small>
             <svg v-if="row.spark" viewBox="0 0 100 24" preserveAspectRatio="none" aria-hidden="true">
@@ -70,24 +72,36 @@ export default {
       </li>
     </ul>
     <p class="vf-empty" v-if="!shown.length">{{ empty }}</p>
+    <p ref="end" class="vf-none" v-if="near.length < shown.length">{{ shown.length - near.length }} more below.</p>
   </div>`,
   props: { initial: Object, columns: Array },
   emits: ["sort"],
   data: () => ({ rows: new Map(), order: [], sort: "worst", reversed: false, tiled: false,
-                 empty: "", live: true, clock: 0, at: performance.now(), tick: performance.now() }),
+                 empty: "", live: true, drawn: STEP, clock: 0, at: performance.now(), tick: performance.now() }),
   created() { this.update(this.initial); },
-  mounted() { this.timer = setInterval(() => { this.tick = performance.now(); }, 1000); },
-  unmounted() { clearInterval(this.timer); },
+  mounted() {
+    this.timer = setInterval(() => { this.tick = performance.now(); }, 1000);
+    this.eye = new IntersectionObserver(seen => { if (seen.some(one => one.isIntersecting)) this.drawn += STEP; },
+      { rootMargin: "1000px" });
+    this.look();
+  },
+  updated() { this.look(); },
+  unmounted() { clearInterval(this.timer); this.eye.disconnect(); },
   computed: {
+    near() { return this.shown.slice(0, this.drawn); },
     shown() { return this.order.map((i) => this.rows.get(i)).filter(Boolean); },
     lost() { return (this.tick - this.at) / 1000; },
     now() { return this.clock + Math.max(0, this.lost); },
   },
   methods: {
     age,
+    look() {
+      this.eye.disconnect();
+      if (this.$refs.end) this.eye.observe(this.$refs.end);
+    },
     update(news) {
       if (news.now) { this.clock = news.now; this.at = this.tick = performance.now(); }
-      for (const row of news.rows ?? []) this.rows.set(row.i, Object.freeze(row));
+      for (const row of Vue.toRaw(news).rows ?? []) this.rows.set(row.i, Object.freeze(row));
       if (news.order) this.order = news.order;
       for (const key of ["sort", "reversed", "tiled", "empty", "live"]) {
         if (news[key] !== undefined) this[key] = news[key];

@@ -42,7 +42,7 @@ from valve_friction_ros.dashboard.pages.theme import (
     table_row,
     text,
 )
-from valve_friction_ros.dashboard.plant_rows import moment, quantity_texts
+from valve_friction_ros.dashboard.plant_rows import FRICTIONS, moment, quantity_texts
 from valve_friction_ros.health import AlarmEvent, Baseline
 from valve_friction_ros.history import HistoryEntry, ValveHistory, drift_text
 from valve_friction_ros.outside_text import printable
@@ -56,7 +56,7 @@ _TITLES = (("parameter", ""), ("value", "vf-n"), ("", "vf-width"), ("", ""), ("v
 def draw_parameters(view: ValveView) -> None:
     """Draw a table of the parameters, or say why there are none."""
     if not view.parameters:
-        text("p", view.reason or "There is no estimate yet.", "vf-none")
+        text("p", view.reason or "No estimate yet.", "vf-none")
         return
     baseline = {one.name: one for one in view.baseline}
     with element("table", "vf-list vf-parameters"):
@@ -110,7 +110,7 @@ class ValveSignals:
         """Draw the signals over time, still without any."""
         words = "Pressure and stem of the last 60 seconds"
         self._live = _chart(live_chart(self._strip.span), "vf-chart-live", words)
-        self._note = text("p", "No sample has come yet.", "vf-none")
+        self._note = text("p", "No samples have been received yet.", "vf-none")
 
     def draw_signature(self, kept: ValveHistory | None) -> None:
         """Draw the signature of the baseline; that of now follows."""
@@ -119,7 +119,7 @@ class ValveSignals:
         self._loop = _chart(loop_chart(record), "vf-chart-loop", "Signature: stem over pressure")
         self._drawn, self._looped = (-1, 0), self._shown - _SIGNATURE_EVERY
         if record is None:
-            text("p", "The record of the baseline is not kept.", "vf-none")
+            text("p", "No record of the baseline is kept.", "vf-none")
 
     def show(self) -> None:
         """Show what has come since the last time."""
@@ -150,7 +150,7 @@ def draw_trend(
         text("p", problem, "vf-none")
     if kept is None:
         if not problem:
-            text("p", "No identification is kept of this valve.", "vf-none")
+            text("p", "The history has no identification of this valve.", "vf-none")
         return
     with element("div", "vf-filters", role="group", aria_label="Time that is shown"):
         for name, span in {**RANGES, "all": None}.items():
@@ -182,7 +182,7 @@ def _chart(options: dict[str, Any], css: str, words: str) -> ui.echart:
 def _trend_words(kept: ValveHistory) -> str:
     trend = kept.trend
     if trend is None:
-        return "No trend: it needs estimates of four days since the baseline."
+        return "No trend yet: it needs estimates from at least four days since the baseline."
     if not trend.is_significant:
         return f"No significant drift of the {trend.what} in {trend.days} days with estimates."
     words = f"{trend.what[0].upper()}{trend.what[1:]}: {drift_text(trend)}"
@@ -201,10 +201,13 @@ def baseline_words(baseline: Baseline | None) -> str:
 
 
 def _friction(entry: HistoryEntry) -> str:
-    for name in ("coulomb_friction", "sliding_friction"):
+    """Write the friction that was compared with the baseline, or one that is known."""
+    ratio = entry.diagnosis.ratio
+    for name in (*([ratio.of] if ratio else []), *FRICTIONS):
         one = entry.parameters.get(name)
         if one is not None and one.value == one.value:
-            return " ".join(number_and_width(one.value, one.half_width)).strip()
+            words = (*number_and_width(one.value, one.half_width), FRICTIONS[name])
+            return " ".join(filter(None, words))
     return "–"
 
 
@@ -213,7 +216,7 @@ def draw_identifications(
 ) -> None:
     """Draw the identifications, the newest first, each with a link to compare it."""
     if history is None:
-        text("p", "No identification is kept of this valve.", "vf-none")
+        text("p", "The history has no identification of this valve.", "vf-none")
         return
     with element("table", "vf-list"):
         table_head(("time", ""), ("level", ""), ("friction, N", "vf-n"), ("ratio", "vf-n"),
@@ -230,7 +233,7 @@ def draw_identifications(
                 )
                 with row, element("td"):
                     made = link("compare", compare(entry.time), "vf-link")
-                    made.props["aria-label"] = f"Compare the one of {when}"
+                    made.props["aria-label"] = f"Compare the identification of {when}"
     if len(history.entries) > _MOST_ROWS:
         text("p", f"The latest {_MOST_ROWS} of {len(history.entries)}.", "vf-none")
 
@@ -238,10 +241,10 @@ def draw_identifications(
 def draw_baselines(history: ValveHistory | None, zone: ZoneInfo) -> None:
     """Draw each change of the baseline, the newest first."""
     if history is None or not history.baselines:
-        text("p", "No baseline was set.", "vf-none")
+        text("p", "No baseline has been set yet.", "vf-none")
         return
     table(
-        ("time", "from then on", "before"),
+        ("time", "new baseline", "previous baseline"),
         (
             (moment(one.time, zone), *map(baseline_words, (one.in_force, one.replaced)))
             for one in reversed(history.baselines[-_MOST_ROWS:])
@@ -252,7 +255,7 @@ def draw_baselines(history: ValveHistory | None, zone: ZoneInfo) -> None:
 def draw_alarms(history: ValveHistory | None, zone: ZoneInfo) -> None:
     """Draw the recorded alarms, the newest first."""
     if history is None or not history.alarms:
-        text("p", "No alarm was recorded.", "vf-none")
+        text("p", "No alarm has been recorded.", "vf-none")
         return
     table(
         ("time", "level", "diagnosis", "recording"),
@@ -271,7 +274,7 @@ def draw_alarms(history: ValveHistory | None, zone: ZoneInfo) -> None:
 def draw_files(files: list[OfferedFile], zone: ZoneInfo) -> None:
     """Draw links to reports and bags."""
     if not files:
-        words = "No report and no recording is in the folders that the dashboard knows."
+        words = "There are no reports or recordings in the dashboard's folders."
         text("p", words, "vf-none")
         return
     with element("table", "vf-list"), element("tbody"):

@@ -51,6 +51,7 @@ from valve_friction_ros.dashboard.pages.valve_cards import (
     draw_trend,
 )
 from valve_friction_ros.dashboard.plant_rows import (
+    FRICTIONS,
     Selection,
     ago,
     drift_number,
@@ -103,7 +104,7 @@ class ValveHead:
         redraw(self._chip, lambda: chip(state, words, letter))
         retitle(self._advice, view.advice)
         self._advice.set_visibility(bool(view.advice))
-        retitle(self._sentence, view.sentence or "No message of this valve has been heard.")
+        retitle(self._sentence, view.sentence or "No message has been received from this valve.")
 
     def show_facts(self, view: ValveView, heard: Heard | None) -> None:
         """Show the numbers, and how old they are now."""
@@ -124,6 +125,8 @@ def _facts(view: ValveView, heard: Heard | None, page: Frame, is_live: bool) -> 
     made = view.identified
     age = "" if made is None else f"  ({ago(time.time() - made / 1e9)} ago)"
     facts = {
+        "friction": _with_unit(view.friction, f"N {FRICTIONS[view.friction.name]}"),
+        "baseline": _with_unit(view.healthy, "N"),
         "friction ÷ baseline": ratio,
         "dead band": _with_unit(view.dead_band, "% of travel"),
         "drift": _drift_words(view),
@@ -146,8 +149,8 @@ def _with_unit(one: Quantity, unit: str) -> str:
 
 def _drift_words(view: ValveView) -> str:
     if view.drift is None:
-        return "none that is significant" if view.friction.is_known else "–"
-    words = f"{drift_number(view.drift)} N a month"
+        return "–"
+    words = f"{drift_number(view.drift)} N per month"
     expected = view.drift.expected
     return f"{words}; limit {expected.date}" if expected else words
 
@@ -290,16 +293,16 @@ class ValveActions:
 
     async def _asked(self, service: str, question: Question, is_again: bool) -> bool:
         verb, note, yes = (
-            ("Set", "All later diagnoses compare with it: set it on a healthy valve only.",
+            ("Set", "It is what all later diagnoses compare with: the valve must be healthy.",
              "Set anyway" if question.alarm else "Set baseline")
             if service == "set_baseline"
-            else ("Restore", "This undoes the last setting of the baseline.", "Restore baseline")
+            else ("Restore", "This undoes the last change of the baseline.", "Restore baseline")
         )  # fmt: skip
 
         def draw() -> None:
             if is_again:
-                ui.label("This has changed while you were asked:").classes("vf-reason")
-            for name, words in (("in force now", question.old), ("from then on", question.new)):
+                ui.label("This changed while the dialog was open:").classes("vf-reason")
+            for name, words in (("current", question.old), ("new", question.new)):
                 with element("div", "vf-pair"):
                     ui.label(name)
                     ui.label(words)
@@ -345,12 +348,12 @@ _PERIOD = 0.2
 _SLOWER = 5
 """Beats of the timer between two looks at all but the signals."""
 _LISTS = (
-    ("changes", "Changes since the baseline", "Nothing is compared with a baseline."),
-    ("evidence", "Moves in service", "No move has been counted."),
-    ("usage", "Usage of the packing", "Nothing is counted."),
-    ("fit", "Fit of the model", "There is no estimate."),
-    ("command", "Answer to the command", "No stem_command is heard."),
-    ("counters", "Node and samples", "Nothing has been heard."),
+    ("changes", "Changes since the baseline", "Nothing has been compared with a baseline yet."),
+    ("evidence", "Moves in service", "No moves have been evaluated yet."),
+    ("usage", "Usage of the packing", "No usage has been counted yet."),
+    ("fit", "Fit of the model", "No estimate yet."),
+    ("command", "Answer to the command", "No stem_command has been received."),
+    ("counters", "Node and samples", "Nothing has been received yet."),
 )
 """Group of values, title of its card, and what stands there without any."""
 _KEPT = ("fit",)
@@ -390,7 +393,7 @@ class _ValvePage:
                 if self._context.is_live and self._context.visitors.may_operate():
                     self._actions.draw()
                 elif self._context.is_live:
-                    text("p", "Your account may view, not operate.", "vf-none")
+                    text("p", "Your account has view-only access.", "vf-none")
             with element("div", "vf-cards"):
                 self._draw_cards()
         self._look()
@@ -398,7 +401,7 @@ class _ValvePage:
 
     def _draw_cards(self) -> None:
         with card("Friction over time", "vf-wide") as self._trend_body:
-            text("p", "The history is being read …", "vf-none")
+            text("p", "Reading the history …", "vf-none")
         with card("Parameters") as self._parameters_body:
             pass
         if self._context.is_live:
@@ -505,7 +508,7 @@ class _ValvePage:
         sharing = ValveFiles.sharing(self._view().namespace, (one.view.namespace for one in valves))
         if files and sharing:
             names = printable(", ".join(sharing), 300)
-            text("p", f"Files of {names} have the same names: they stand here too.", "vf-none")
+            text("p", f"Files of {names} have the same names: they are listed, too.", "vf-none")
         draw_files(files, self._page.zone)
 
     def _compare(self, stamp: int) -> str:

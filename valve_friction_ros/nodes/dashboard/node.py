@@ -446,8 +446,8 @@ def _serve(node: Dashboard, limited: contextlib.ExitStack) -> int:
 
     Once it serves, Ctrl-C leaves a limited time to all that is within `limited`.
     """
-    # Libraries for other uses, 10 MB: engineio, which is imported below, does without them.
-    for unused in ("aiohttp", "tornado"):
+    # Libraries for other uses: engineio, httpx and uvicorn, imported below, do without them.
+    for unused in ("aiohttp", "tornado", "httpx._main", "watchfiles"):
         sys.modules.setdefault(unused, None)  # type: ignore[arg-type]
     try:
         from valve_friction_ros.dashboard.pages import server  # noqa: PLC0415
