@@ -230,7 +230,6 @@ class TestNoRecording:
             (["--begin", "3", "--end", "2"], "a stretch cannot begin at 3 s and end at 2"),
             (["--last", "0"], "the last seconds must be above zero, got 0"),
             (["--delimiter", "ab"], "the delimiter must be one character"),
-            (["--decimal", ",", "--delimiter", ","], "delimiter and decimal mark are both ','"),
         ],
     )
     def test_options(self, call, bag, options, words):

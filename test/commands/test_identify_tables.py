@@ -246,9 +246,7 @@ def test_a_double_acting_actuator(friction, expected, record, valve, tmp_path, c
         )
     ]
     path.write_text("\n".join(["time_s,position_m,pressure_pa,below", *rows]) + "\n")
-    section = (
-        "columns: {opposing_pressure_column: below, pressure_unit: Pa, opposing_area_ratio: 0.5}\n"
-    )
+    section = "columns: {opposing_pressure_column: below, opposing_area_ratio: 0.5}\n"
     assert friction(path, "--valve", valve(section))[0] == pytest.approx(expected, rel=1e-6)
     code, _, err = command("identify", tmp_path, "--valve", valve(section))
     assert code == 2

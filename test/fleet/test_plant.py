@@ -29,6 +29,7 @@ import pytest
 from browser import Tab, chromium
 from local_server import free_port
 
+from valve_friction_ros import history
 from valve_friction_ros.commands.main import run
 from valve_friction_ros.dashboard import Plant, ServiceRequest
 from valve_friction_ros.dashboard.alarm_list import HistoryOperator
@@ -265,9 +266,11 @@ class TestDashboard:
         assert one.view.parameter("spring_constant").value == pytest.approx(2.05e5, rel=0.01)
         assert {str(q.name) for q in one.view.baseline} == {"coulomb_friction", "sliding_friction"}
 
-    def test_its_alarms_are_raised_at_their_record_and_are_answered(self, shown):
+    def test_its_alarms_are_raised_at_their_record_and_are_answered(self, shown, monkeypatch):
+        """The step of an alarm shows without a history being read again."""
         _, valves, kept = shown
         operator = HistoryOperator(kept)
+        monkeypatch.setattr(history, "valve_histories", pytest.fail)
 
         def ask(service, **more):
             values = {"alarm_kind": "friction_high", "alarm_who": "Anna", "alarm_text": "",

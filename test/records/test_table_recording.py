@@ -26,7 +26,6 @@ from valve_friction_ros.records.recordings import holds_a_force, read_table
 from valve_friction_ros.records.table import read_columns
 
 HEADER = "time_s,position_m,pressure_pa"
-SI = {"position_unit": "m", "pressure_unit": "Pa"}
 TIME = np.arange(40) / 1000
 POSITION = 1e-3 + np.sin(TIME) / 100
 PRESSURE = 1e5 + 1e4 * np.cos(TIME)
@@ -336,14 +335,27 @@ class TestColumns:
         np.testing.assert_allclose(record.position, POSITION * size.get("position", 1), rtol=1e-14)
         np.testing.assert_allclose(record.pressure, PRESSURE * size.get("pressure", 1), rtol=1e-14)
 
-    def test_the_unit_of_a_named_column_is_asked_for(self, write):
-        """1.2 of a pressure may be bar; Pa would be read wrongly without a word."""
+    def test_a_named_column_without_a_unit_is_in_its_si_unit(self, write):
+        """As files of earlier versions mean it."""
         path = write(["time_s,Stem,Air", *GOOD])
+        assert_good(
+            read_csv(path, BENCH_VALVE, Columns(position_column="Stem", pressure_column="Air"))
+        )
+
+    def test_the_unit_of_a_named_column_that_cannot_be_si_is_asked_for(self, write):
+        """1.2 of a pressure may be bar; Pa would be read wrongly without a word."""
+        rows = [
+            f"{t!r},{1e3 * x!r},{1e-5 * p!r}"
+            for t, x, p in zip(TIME.tolist(), POSITION.tolist(), PRESSURE.tolist(), strict=True)
+        ]
+        path = write(["time_s,Stem,Air", *rows])
         form = Columns(position_column="Stem", pressure_column="Air")
         told = refused(path, form=form)
-        assert "the unit of the pressure 'Air', values from 109992 to 110000" in told
+        assert "the unit of the pressure 'Air', values from 1.09992 to 1.1" in told
         assert "the unit of the position 'Stem'" in told
-        assert_good(read_csv(path, BENCH_VALVE, replace(form, **SI)))
+        record = read_csv(path, BENCH_VALVE, replace(form, position_unit="mm", pressure_unit="bar"))
+        np.testing.assert_allclose(record.position, POSITION, rtol=1e-12)
+        np.testing.assert_allclose(record.pressure, PRESSURE, rtol=1e-12)
 
     def test_missing_under_its_other_name(self, write):
         message = refused(write([HEADER, *GOOD]), form=Columns(time_column="t"))
@@ -504,7 +516,7 @@ class TestUnreadableFiles:
     def test_no_header(self, write):
         """Columns are then called by their numbers."""
         assert "which column is the time (--time-column 1 or 2 or 3)" in refused(write(GOOD))
-        form = Columns(time_column="1", position_column="2", pressure_column="3", **SI)
+        form = Columns(time_column="1", position_column="2", pressure_column="3")
         assert_good(read_csv(write(GOOD), BENCH_VALVE, form))
 
     def test_another_encoding(self, write):

@@ -277,25 +277,20 @@ class HistoryCache:
 _FOREVER = 2**63 - 1
 
 
-def _status_of(kept: ValveHistory, alarms: Mapping[AlarmKind, Alarm]) -> Status:
-    """Return what is known of a valve as its identifier would say it.
+def _status_of(kept: ValveHistory) -> Status:
+    """Return what is known of a valve as its identifier would say it, but for its alarms.
 
     The last identification that was no refusal gives the numbers, and the last baseline what they
-    are compared with; an alarm that is told raises the level.
+    are compared with.
     """
     last = kept.entries[-1]
     found = next((one for one in reversed(kept.entries) if not one.refusal), None)
     diagnosis = (found or last).diagnosis
-    level, signal, told = diagnosis.level, diagnosis.status_signal, [diagnosis.message]
-    for one in alarms.values():
-        if one.is_told and one.kind is AlarmKind.WHOLE_VALVE:
-            told.append(one.condition.message)
-            if one.condition.level > level:
-                level, signal = one.condition.level, one.condition.status_signal
+    told = [diagnosis.message]
     values = {
         "estimate_valid": str(not last.refusal).lower(),
         "reason": last.refusal,
-        "NE 107": signal.value,
+        "NE 107": diagnosis.status_signal.value,
     }
     if last.refusal:
         told.insert(0, f"the last record was refused: {last.refusal}")
@@ -311,8 +306,21 @@ def _status_of(kept: ValveHistory, alarms: Mapping[AlarmKind, Alarm]) -> Status:
         values["survey"] = diagnosis.survey.value
     values |= ratio_values(diagnosis.ratio)
     values |= trend_values(kept.trend)
-    values |= alarm_values(alarms)
-    return Status(f"{kept.valve.name}: friction", level, kept.valve.tag, "; ".join(told), values)
+    name, message = f"{kept.valve.name}: friction", "; ".join(told)
+    return Status(name, diagnosis.level, kept.valve.tag, message, values)
+
+
+def _with_alarms(status: Status, alarms: Mapping[AlarmKind, Alarm]) -> Status:
+    """Return the status with its alarms; one of the whole valve that is told raises the level."""
+    level, told = status.level, [status.message]
+    values = {**status.values, **alarm_values(alarms)}
+    for one in alarms.values():
+        if one.is_told and one.kind is AlarmKind.WHOLE_VALVE:
+            told.append(one.condition.message)
+            if one.condition.level > level:
+                level = one.condition.level
+                values["NE 107"] = one.condition.status_signal.value
+    return status._replace(level=level, message="; ".join(told), values=values)
 
 
 class KeptValves(HistoryCache):
@@ -331,6 +339,8 @@ class KeptValves(HistoryCache):
         self._plant = plant
         self._history = database.History(place)
         self._told = (-1, -1)
+        self._read: HistoryMark | None = None
+        self._statuses: dict[KeptValve, list[Status]] = {}
 
     def _refresh(self) -> bool:
         is_new = super()._refresh()
@@ -344,15 +354,20 @@ class KeptValves(HistoryCache):
         return is_new
 
     def _tell(self) -> None:
+        """Tell of all valves; the step of an alarm has none of their histories read again."""
         now = time.monotonic()
         self._plant.expect(self.valves)
+        mark = None if self._mark is None else self._mark._replace(alarm_event=0)
+        if mark != self._read or mark is None or not mark.settled:
+            self._statuses.clear()
+        self._read = mark
         for valve in self.valves:
             try:
-                found = database.valve_histories(self._history, (valve,), 0, _FOREVER)
-                statuses = [
-                    _status_of(one, database.read_alarms(self._history, valve.name))
-                    for one in found
-                ]
+                if valve not in self._statuses:
+                    found = database.valve_histories(self._history, (valve,), 0, _FOREVER)
+                    self._statuses[valve] = [_status_of(one) for one in found]
+                alarms = database.read_alarms(self._history, valve.name)
+                statuses = [_with_alarms(one, alarms) for one in self._statuses[valve]]
             except (ValueError, TypeError, KeyError) as error:
                 signal = {"NE 107": StatusSignal.CHECK_FUNCTION.value}
                 told = f"not readable: {error}"

@@ -53,7 +53,8 @@ class Columns:
     """What is said of a table that it does not tell itself, in the words of the options.
 
     The same words are the keys of the section ``columns:`` of a valve file. What is empty is
-    recognized from the table. Units are those of `records.units`.
+    recognized from the table. Units are those of `records.units`; a column that is named here, and
+    whose unit nobody says, is in its SI unit where its numbers may be.
 
     Raises ValueError, which names the word, if a value is impossible.
     """

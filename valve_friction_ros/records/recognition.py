@@ -51,6 +51,11 @@ _OPC_GOOD, _OPC_MOST, _CERTAIN = 192, 255, 100
 _MILLISECONDS = re.compile(r"milli\w*|m ?sec|ms|sub ?sec\w*", re.IGNORECASE)
 """Headers of the milliseconds beside a time of the day."""
 
+_LONGEST_TRAVEL, _LEAST_PRESSURE = 0.5, 2e3
+"""Of a stem, m, and of an actuator that moves, Pa: no percentage is below, no bar and no kPa above.
+
+A column that is named without a unit is in its SI unit, as files of earlier versions mean it."""
+
 _LOCAL = ("d", "microdays")
 """Units of clocks that count days: they are local, as those of spreadsheets are."""
 
@@ -279,6 +284,8 @@ class _Recognition(Look):
             if unit in KNOWN_UNITS[quantity]:
                 return unit
         numbers = self._of_signal(name, place)
+        if name in self.given and _may_be_si(quantity, numbers):
+            return {"position": "m", "pressure": "Pa", "force": "N"}[quantity]
         span = f", values from {min(numbers):g} to {max(numbers):g}" if numbers else ""
         known = " ".join(KNOWN_UNITS[quantity])
         self.questions.append(
@@ -426,6 +433,14 @@ class _Recognition(Look):
             self._ask_name(quantity, [name for name, _, _ in among])
             if among and not any(said_.unit for _, said_, _ in among):
                 self.questions[-1] += f", and its unit (--{quantity}-unit)"
+
+
+def _may_be_si(quantity: str, numbers: Sequence[float]) -> bool:
+    """Return whether numbers without a unit may be metres of a stem, or pascals of an actuator."""
+    largest = max(map(abs, numbers), default=0.0)
+    if quantity == "position":
+        return largest < _LONGEST_TRAVEL
+    return quantity != "pressure" or largest > _LEAST_PRESSURE
 
 
 def _as_written(label: str, name: str) -> str:
