@@ -13,6 +13,7 @@ import copy
 import itertools
 import math
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -235,6 +236,17 @@ class Regression:
 
         self.slips: dict[float, _Array] = {}
 
+    @property
+    def dry(self) -> int:
+        """Place of F_c among the coefficients; -1 where it is known."""
+        return self.names.index("coulomb_friction") if "coulomb_friction" in self.names else -1
+
+    @cached_property
+    def blocks(self) -> list[NDArray[np.intp]]:
+        """Averages that are taken, in stretches of a stroke or so."""
+        taken = np.arange(self.averages.taken.size)
+        return np.array_split(taken, int(np.clip(self.strokes, *_BLOCKS)))
+
     def falling(self, velocity: _Array, stribeck: float) -> _Array:
         """Share of the slip force that is left at each velocity."""
         return np.asarray(np.exp(-((velocity / stribeck) ** 2)))
@@ -350,7 +362,7 @@ class Regression:
             speed: self.descended(speed)[0]
             for speed in (0.0, *(self.averages.speed * _STRIBECK_SPEEDS).tolist())
         }
-        dry = self.names.index("coulomb_friction") if "coulomb_friction" in self.names else -1
+        dry = self.dry
         falling = {
             speed: one
             for speed, one in found.items()
@@ -399,17 +411,16 @@ class Regression:
         log_evidence = np.sum(drawn * estimate, axis=1) - np.linalg.slogdet(whole)[1]
         log_evidence += np.sum(np.log(precision[:, rare]), axis=1)
         log_odds = math.log(_HOW_RARE / (1.0 - _HOW_RARE)) * np.sum(chosen, axis=1)
-        return _probable(
-            0.5 * log_evidence + log_odds,
-            [_Choice(1.0, *one, scores) for one in zip(estimate, covariance, strict=True)],
-        )
+        return [
+            _Choice(share, estimate[at], covariance[at], scores)
+            for at, share in _probable(0.5 * log_evidence + log_odds)
+        ]
 
     def falls(self, solved: _Solved, variance: float) -> list[_Choice]:
         """Return the solution for each probable fall of the friction with speed, none among them.
 
         What a record leaves open of it, dry and viscous friction leave open.
         """
-        dry = self.names.index("coulomb_friction") if "coulomb_friction" in self.names else -1
         count = len(self.names) + (not self.lag.is_known)
         plain = [one[:, :count] for one in solved.columns]
         forces = [
@@ -417,9 +428,8 @@ class Regression:
             for residual, columns in zip(solved.residual, solved.columns, strict=True)
         ]
         weight = solved.weight
-        found: list[_Choice] = []
-        logs: list[float] = []
-        for stribeck in (0.0, *_FALLS.tolist()) if dry >= 0 else (0.0,):
+        found, logs = [], []
+        for stribeck in (0.0, *_FALLS.tolist()) if self.dry >= 0 else (0.0,):
             columns, precision = plain, solved.precision[:count]
             expected = solved.expected[:count]
             if stribeck:
@@ -435,20 +445,22 @@ class Regression:
             log = -float(weight @ (0.5 * (left[0] + left[1])) ** 2) / variance
             log -= float(precision @ (estimate - expected) ** 2)
             log += np.sum(np.log(precision[count:])) - np.linalg.slogdet(whole)[1]
-            frictions = [dry, -1] if stribeck else [dry]
+            frictions = [self.dry, -1] if stribeck else [self.dry]
             sure = estimate[frictions] / np.sqrt(np.diag(covariance)[frictions])
             positive = float(np.prod(normal(sure)))
-            scores = self.scores(left, columns, weight, variance)
-            found.append(_Choice(1.0, estimate, covariance, scores))
             share = _SLIPPING / _FALLS.size if stribeck else 1.0 - _SLIPPING
+            found.append((estimate, covariance, left, columns))
             logs.append(0.5 * log + math.log(share * max(positive, 1e-10)))
-        return _probable(np.array(logs), found)
+        return [
+            _Choice(share, *found[at][:2], self.scores(*found[at][2:], weight, variance))
+            for at, share in _probable(np.array(logs))
+        ]
 
     def scores(
         self, residual: list[_Array], columns: list[_Array], weight: _Array, variance: float
     ) -> _Array:
         """Return the information by the scatter of the strokes."""
-        blocks = np.array_split(np.arange(weight.size), int(np.clip(self.strokes, *_BLOCKS)))
+        blocks = self.blocks
         scores = np.stack(
             [
                 0.5
@@ -573,12 +585,12 @@ class Regression:
         )
 
 
-def _probable(logs: _Array, choices: Sequence[_Choice]) -> list[_Choice]:
-    """Return the choices that are probable, by the logarithms of their probabilities."""
+def _probable(logs: _Array) -> list[tuple[int, float]]:
+    """Return which choices are probable, by the logarithms of their probabilities, and how much."""
     probability = np.exp(logs - np.max(logs))
     kept = np.flatnonzero(probability > _LEAST_PROBABLE)
     probability /= np.sum(probability[kept])
-    return [choices[at]._replace(probability=float(probability[at])) for at in kept]
+    return [(int(at), float(probability[at])) for at in kept]
 
 
 def _median(values: _Array, shares: _Array) -> float:
@@ -639,8 +651,7 @@ class Posterior:
     ) -> None:
         self.regression, self.solved = regression, solved
         self.inflation, self.stribeck, self.near = inflation, stribeck, near
-        covariance, count = solved.covariance, solved.weight.size
-        blocks = np.array_split(np.arange(count), int(np.clip(regression.strokes, *_BLOCKS)))
+        covariance, blocks = solved.covariance, regression.blocks
         self.scores = regression.scores(solved.residual, solved.columns, solved.weight, variance)
         self.scatter = covariance @ self.scores @ covariance
         self.all = [_Choice(1.0, solved.estimate, covariance, self.scores)]
@@ -719,6 +730,7 @@ class Posterior:
     def _given_lag(self, gradient: _Array, choice: _Choice) -> tuple[float, float, float]:
         """Return a number, its slope over the lag's coefficient, and its deviation at that lag."""
         index, size = len(self.regression.names), choice.estimate.size
+        # A slip, which comes last, has no part in the number where only one of both has it.
         gradient = np.pad(gradient[:size], (0, max(size - gradient.size, 0)))
         along = choice.covariance @ gradient
         value, variance = float(gradient @ choice.estimate), float(gradient @ along)

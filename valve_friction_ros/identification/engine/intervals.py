@@ -12,14 +12,16 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from enum import Enum, auto
 
 import numpy as np
 from numpy.typing import NDArray
 
 from valve_friction_ros.identification.engine.broad_model import SWINGING, BroadModel
 from valve_friction_ros.identification.engine.coordinates import MAIN, Coordinates
-from valve_friction_ros.identification.engine.imperfections import TIMING
+from valve_friction_ros.identification.engine.imperfections import TIMING, Profile
 from valve_friction_ros.identification.engine.lags import (
+    LARGEST_LAG,
     LagPrior,
     LagProfile,
     mixture_half_width,
@@ -210,10 +212,27 @@ def _possible(fit: PosteriorFit) -> NDArray[np.float64]:
     return np.clip(fit.remaining, -bounds, bounds)
 
 
-def has_tried_lags(fits: Sequence[PosteriorFit]) -> bool:
-    """Return whether the search could trade viscous friction for lag, where either is unknown."""
-    names = fits[0].names
-    return len(fits) > 1 or "viscous_friction" not in names or not set(TIMING) & set(names)
+class Doubt(Enum):
+    """Why a simulated stem tells only what the force balance tells, too."""
+
+    MISFIT = auto()
+    LAG = auto()
+    UNTRIED = auto()
+
+
+def doubt_of(fits: Sequence[PosteriorFit], profile: Profile = Profile.PLANT) -> Doubt | None:
+    """Return why the best fit does not follow the record of a plant, or None where it does.
+
+    Its residual is more than noise, its lag is none that is possible, or the search could not trade
+    viscous friction for lag, where either is unknown.
+    """
+    best = fits[0]
+    if best.inflation > NOT_QUITE and profile.has_imperfections:
+        return Doubt.MISFIT
+    if abs(best.lag) >= LARGEST_LAG:
+        return Doubt.LAG
+    knows = "viscous_friction" not in best.names or not set(TIMING) & set(best.names)
+    return None if len(fits) > 1 or knows else Doubt.UNTRIED
 
 
 def estimated(

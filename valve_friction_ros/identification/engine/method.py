@@ -31,13 +31,12 @@ from valve_friction_ros.identification.engine.friction_curve import (
 )
 from valve_friction_ros.identification.engine.imperfections import Profile
 from valve_friction_ros.identification.engine.intervals import (
-    NOT_QUITE,
     Estimated,
     NumbersAt,
+    doubt_of,
     estimated,
-    has_tried_lags,
 )
-from valve_friction_ros.identification.engine.lags import LARGEST_LAG, LagPrior, LagProfile
+from valve_friction_ros.identification.engine.lags import LagPrior, LagProfile
 from valve_friction_ros.identification.engine.numbers import (
     ASYMMETRY,
     found_sizes,
@@ -330,9 +329,8 @@ def _of_simulation(
             "valve, and their units, and that its stem reaches both ends of the travel; if the "
             "packing was changed during the record, clear the buffer and record again"
         )
-    is_possible = abs(fit.lag) < LARGEST_LAG
-    follows = fit.inflation <= NOT_QUITE and has_tried_lags(fits) and is_possible
     if profile.has_imperfections:
+        follows = doubt_of(fits) is None
         if follows:
             balanced = timed_numbers(curves, LagProfile.of(fits))
         numbers = checked_by_curve(numbers, balanced, follows, fit.at["slip_force"])

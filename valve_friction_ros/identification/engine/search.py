@@ -476,13 +476,14 @@ class _Search:
         """Return what the friction curves say, as starts."""
         starts: list[Coordinates] = []
         for curve in self.curves:
-            values = {name: one for name, one in curve.law.items() if name in MAIN}
+            law = curve.law
+            values = {name: one for name, one in law.items() if name in MAIN}
             spring = values.get("spring_constant", 0.0)
             if not (spring > 0 and values.get("coulomb_friction", 0.0) > 0):
                 continue
             if "viscous_friction" in values:  # else it is given
                 values["viscous_friction"] = max(values["viscous_friction"], SWINGING * spring)
-            slip = max(curve.law.get("slip_force", 0.0), 0.0)
+            slip = max(law.get("slip_force", 0.0), 0.0)
             starts.append(
                 {
                     **self.base,

@@ -19,11 +19,10 @@ from valve_friction_ros.identification.engine.friction_curve import FrictionCurv
 from valve_friction_ros.identification.engine.imperfections import Profile
 from valve_friction_ros.identification.engine.intervals import (
     NOISE_LIKE,
-    NOT_QUITE,
+    Doubt,
     Estimated,
-    has_tried_lags,
+    doubt_of,
 )
-from valve_friction_ros.identification.engine.lags import LARGEST_LAG
 from valve_friction_ros.identification.engine.posterior_fit import PosteriorFit
 from valve_friction_ros.identification.engine.sentences import late_sensor, main_doubt, slips
 from valve_friction_ros.identification.settings import IdentificationSettings
@@ -48,19 +47,21 @@ USABLE = 0.1
 
 Chosen: well below the 25 % of growth that raises the first alarm."""
 
-_SPLIT_DOUBT = (
-    "the motion is not quite that of any friction model here ({:.2g} µm are not noise), which "
-    "leaves the sliding friction but not what it is made of"
-)
+_DOUBTS = {
+    Doubt.MISFIT: (
+        "the motion is not quite that of any friction model here ({um:.2g} µm are not noise), "
+        "which leaves the sliding friction but not what it is made of"
+    ),
+    Doubt.LAG: (
+        "the best fit has the signals {ms:.0f} ms apart, which is not plausible: something else in "
+        "the motion passes for a lag"
+    ),
+    Doubt.UNTRIED: "the search ended before it had tried other lags: bring a shorter record",
+}
 _FAILED = 100.0
 """Inflation of the residual beyond which nothing that only the simulation knows is reported: ten
 times the noise."""
 
-_IMPOSSIBLE = (
-    "the best fit has the signals {:.0f} ms apart, which is not plausible: something else in the "
-    "motion passes for a lag"
-)
-_UNTRIED = "the search ended before it had tried other lags: bring a shorter record"
 _FURTHER, _BELOW_TOP = 0.35, 0.95
 """Half width over F_c of what it may fall further beyond the speeds of a slow record: of packings
 that slip, F_s is up to twice F_c, and half of all packings slip. And the share of its way that the
@@ -182,11 +183,10 @@ def _no_surer_than_its_spring(verdicts: dict[str, Parameter]) -> dict[str, Param
 
 def _split_doubt(fits: Sequence[PosteriorFit], misfit: Misfit, profile: Profile) -> str:
     """Return why only what the force balance determines too can be identified, or nothing."""
-    if fits[0].inflation > NOT_QUITE and profile.has_imperfections:
-        return _SPLIT_DOUBT.format(1e6 * misfit.systematic)
-    if abs(fits[0].lag) >= LARGEST_LAG:
-        return _IMPOSSIBLE.format(1e3 * abs(fits[0].lag))
-    return "" if has_tried_lags(fits) else _UNTRIED
+    doubt = doubt_of(fits, profile)
+    if doubt is None:
+        return ""
+    return _DOUBTS[doubt].format(um=1e6 * misfit.systematic, ms=1e3 * abs(fits[0].lag))
 
 
 def _unseen(
