@@ -19,6 +19,7 @@ from valve_friction_ros.health import (
     Level,
     MonitorSettings,
     RefusedRecordError,
+    SlidingFriction,
     Standstill,
     StandstillCounter,
     identify_snapshot,
@@ -195,6 +196,43 @@ class TestHeldInATest:
     def test_at_an_end_the_stem_may_rest_on_a_stop(self, place):
         numbers = held_numbers(self.recording(place), VALVE)
         assert held_finding(numbers, HEALTHY, VALVE, FrictionLimits()) is None
+
+    @pytest.mark.parametrize(
+        ("balance", "least"), [(-1000.0, 590.4), (0.0, 590.4), (200.0, 390.4), (700.0, None)]
+    )
+    @pytest.mark.parametrize("upper", [True, False])
+    def test_a_partial_stroke_from_an_end_bounds_it_by_the_push_inwards(
+        self, balance, least, upper
+    ):
+        """The force is 5000 ± 590 N. Where it lies beyond the spring outwards, a stop may bear it.
+
+        At the upper end the force falls, at the lower one it rises, to move the stem.
+        """
+        place, outwards = (0.0178, 1.0) if upper else (0.0002, -1.0)
+        spring = {
+            "spring_constant": Measured(1e5, 0.0),
+            "spring_preload": Measured(5000.0 - outwards * balance - 1e5 * place, 0.0),
+        }
+        baseline = Baseline(coulomb_friction=200.0, half_width=0.0, numbers=REACH | spring)
+        numbers = held_numbers(self.recording(place), VALVE)
+        numbers["held_position"] = Measured(place, 0.0)
+        found = held_finding(numbers, baseline, VALVE, FrictionLimits())
+        if least is None:
+            assert found is None
+        else:
+            assert found.friction_ratio == pytest.approx(least / 200.0, rel=1e-3)
+
+    def test_static_friction_of_the_baseline_is_its_slip_above_the_sliding_friction(self):
+        """F_c, known badly, hides nothing: 590 N are 1.34 times 400 + 10 + 20 + 10 N."""
+        numbers = REACH | {
+            "coulomb_friction": Measured(400.0, 200.0),
+            "slip_force": Measured(20.0, 10.0),
+        }
+        baseline = Baseline(sliding=SlidingFriction(400.0, 10.0, 1e-3), numbers=numbers)
+        found = held_finding(
+            held_numbers(self.recording(0.009), VALVE), baseline, VALVE, FrictionLimits()
+        )
+        assert found.friction_ratio == pytest.approx(590.4 / 440.0, rel=1e-3)
 
     def test_the_monitor_forgets_it_with_the_next_record(self):
         monitor = FrictionMonitor(MonitorSettings(VALVE))

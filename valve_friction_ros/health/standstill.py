@@ -179,7 +179,8 @@ class StandstillCounter:
 def held_numbers(recording: Recording, valve: Valve) -> dict[str, Measured]:
     """Return the largest static friction that surely held the stem in a record, N, and where, m.
 
-    There is nothing where the stem nowhere rested. The numbers are ``held_friction`` and
+    There is nothing where the stem nowhere rested. The numbers are ``held_friction``,
+    ``held_force``, the mean of the lowest and the highest force meanwhile, N, and
     ``held_position``.
     """
     if not math.isfinite(valve.travel):
@@ -196,8 +197,10 @@ def held_numbers(recording: Recording, valve: Valve) -> dict[str, Measured]:
     if not found:
         return {}
     most = max(found, key=lambda one: one.least_friction(valve))
+    middle = 0.5 * (most.lowest_pressure + most.highest_pressure)
     return {
         "held_friction": Measured(most.least_friction(valve), 0.0),
+        "held_force": Measured(valve.actuator_force(middle), 0.0),
         "held_position": Measured(most.position, _STILL * valve.travel),
     }
 
@@ -209,20 +212,42 @@ def held_finding(
 
     None without them, and where the stem may have rested on a stop.
     """
-    least, place = (numbers.get(name) for name in ("held_friction", "held_position"))
-    if least is None or place is None or not _may_move(place.value, baseline, valve):
-        return None
-    ratio = least.value / _healthy_friction(baseline)
-    if not ratio > limits.warn_ratio:
+    least, place = _surely_held(numbers, baseline, valve), numbers.get("held_position")
+    ratio = least / _healthy_friction(baseline)
+    if place is None or not ratio > limits.warn_ratio:
         return None
     is_error = ratio > limits.error_ratio
     return Finding(
         Level.ERROR if is_error else Level.WARN,
         StatusSignal.FAILURE if is_error else StatusSignal.MAINTENANCE_REQUIRED,
-        said(Code.HELD_IN_TEST, position=place.value, friction=least.value, ratio=ratio),
+        said(Code.HELD_IN_TEST, position=place.value, friction=least, ratio=ratio),
         leads=True,
         friction_ratio=ratio,
     )
+
+
+def _surely_held(numbers: Mapping[str, Measured], baseline: Baseline, valve: Valve) -> float:
+    """Return the largest static friction that surely held the stem in a test, N, or 0.
+
+    It is half of the force's swing. At an end of its way, as in a partial stroke, the stem may have
+    been pressed on a stop: what the force went beyond k·x + F_0 on that side says nothing then.
+    """
+    swing, middle, place = (
+        numbers.get(name) for name in ("held_friction", "held_force", "held_position")
+    )
+    if swing is None or place is None:
+        return 0.0
+    can_rise, can_fall = _room(place.value, baseline, valve)
+    if can_rise and can_fall:
+        return swing.value
+    spring, preload = (baseline.numbers.get(name) for name in ("spring_constant", "spring_preload"))
+    if not (can_rise or can_fall) or middle is None or spring is None or preload is None:
+        return 0.0
+    inwards = middle.value - spring.value * place.value - preload.value
+    doubt = math.hypot(
+        spring.half_width * place.value, spring.value * place.half_width, preload.half_width
+    )
+    return swing.value + min((inwards if can_rise else -inwards) - doubt, 0.0)
 
 
 def standstill_finding(
@@ -233,7 +258,7 @@ def standstill_finding(
     None unless it rests where the stem went when the baseline was set, away from the ends of that
     way: at an end it may rest on a stop under any pressure.
     """
-    if not _may_move(standstill.position, baseline, valve):
+    if not all(_room(standstill.position, baseline, valve)):
         return None
     least, healthy = standstill.least_friction(valve), _healthy_friction(baseline)
     if not least > factor * healthy:
@@ -257,18 +282,27 @@ def standstill_finding(
     )
 
 
-def _may_move(position: float, baseline: Baseline, valve: Valve) -> bool:
-    """Return whether a stem rests where it went when the baseline was set, away from the ends."""
+def _room(position: float, baseline: Baseline, valve: Valve) -> tuple[bool, bool]:
+    """Return whether a stem can surely move up from a place, and down.
+
+    It can where the stem went when the baseline was set: no stop lies between.
+    """
     numbers, margin = baseline.numbers, _STOP * valve.travel
     low, high = numbers.get("lowest_position"), numbers.get("highest_position")
     if low is None or high is None:
-        return False
-    return low.value + margin < position < high.value - margin
+        return False, False
+    return position < high.value - margin, position > low.value + margin
 
 
 def _healthy_friction(baseline: Baseline) -> float:
-    """Return the largest friction that the baseline admits, N."""
-    numbers = baseline.numbers
+    """Return the largest static friction that the baseline admits, N.
+
+    The sliding friction is no less than F_c, so that F_s is at most that and F_s − F_c.
+    """
+    numbers, slip = baseline.numbers, baseline.numbers.get("slip_force")
+    if baseline.sliding is not None and slip is not None:
+        largest = baseline.sliding.value + baseline.sliding.half_width
+        return largest + max(slip.value, 0.0) + slip.half_width
     found = [one for name in ("coulomb_friction", "static_friction") if (one := numbers.get(name))]
     if baseline.coulomb_friction is not None:
         found.append(Measured(baseline.coulomb_friction, baseline.half_width))

@@ -170,6 +170,11 @@ class PosteriorFit:
         return self.stages[-1].misfit / inflation + self.stages[-1].penalty
 
     @property
+    def plain_misfit(self) -> float:
+        """Sum of the squared residuals with the noise of the pressure in them."""
+        return float(np.sum((self.residual * self.model.weights) ** 2))
+
+    @property
     def lag(self) -> float:
         """Time by which the stem is seen late in all, s."""
         return lag_of(self.at)
