@@ -10,6 +10,7 @@
 """The lag of the stem: its prior, its likelihood by fits, and what it leaves of a number."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -23,6 +24,7 @@ from valve_friction_ros.identification.engine.lags import (
     spread_of,
 )
 from valve_friction_ros.identification.engine.posterior_fit import PosteriorFit, Stage
+from valve_friction_ros.identification.engine.search import _lowest
 
 SIGMA = 0.01
 SHARPNESS = 1.5  # the logarithm of the likelihood is divided by it
@@ -81,12 +83,19 @@ class TestMixture:
         assert spread_of(np.exp(-0.5 * (LAGS / SIGMA) ** 2)) == pytest.approx(SIGMA, rel=1e-3)
 
 
-def fit(lag, cost, is_apart=False):
+def fit(lag, cost, is_apart=False, residual=0.0):
     at = {"delay": lag, "stem_lag": 0.0, "force_lag": 0.0}
     stage = Stage(at, np.array([[SIGMA**2]]), cost, 0.0)
     nothing = np.zeros(1)
     return PosteriorFit(
-        None, ("delay",), (stage,), 1.0, nothing, nothing, nothing, is_apart=is_apart
+        SimpleNamespace(weights=1.0),
+        ("delay",),
+        (stage,),
+        1.0,
+        nothing,
+        nothing,
+        np.array([residual]),
+        is_apart=is_apart,
     )
 
 
@@ -98,21 +107,29 @@ def parabola(lifted=0.0):
 class TestProfile:
     def test_of_a_parabola(self):
         expected = -0.5 * (LAGS / SIGMA) ** 2 / SHARPNESS
-        found = LagProfile.of(parabola()).log_likelihood
+        found = LagProfile.of(parabola()).by_fits
         np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-12)
 
     @pytest.mark.parametrize("lifted", [0.5, 3.0, 10.0])
     def test_a_fit_that_ends_too_high_excludes_no_lag(self, lifted):
-        usual = LagProfile.of(parabola()).log_likelihood
-        assert np.all(LagProfile.of(parabola(lifted)).log_likelihood >= usual - 0.5)
-        assert LagProfile.of(parabola(lifted)).log_likelihood[150] == 0.0
+        usual = LagProfile.of(parabola()).by_fits
+        assert np.all(LagProfile.of(parabola(lifted)).by_fits >= usual - 0.5)
+        assert LagProfile.of(parabola(lifted)).by_fits[150] == 0.0
 
     def test_one_far_apart_is_as_likely_as_it_fits_and_no_more_than_the_best(self):
         far = 0.1
         there = int(np.argmin(np.abs(LAGS - far)))
         for cost, expected in ((4.0, -2.0), (-9.0, 0.0)):
-            found = LagProfile.of([*parabola(), fit(far, cost, is_apart=True)]).log_likelihood
+            found = LagProfile.of([*parabola(), fit(far, cost, is_apart=True)]).by_fits
             assert found[there] == pytest.approx(expected, abs=1e-3)
+
+    def test_a_thirtieth_of_the_simulations_are_misled(self):
+        """Beside a narrow likelihood of L, 3 % of the probability is spread over all lags."""
+        profile = LagProfile.of(parabola())
+        told, alone = np.exp(profile.log_likelihood), np.exp(profile.by_fits)
+        anywhere = (told - alone) / np.sum(told)
+        np.testing.assert_allclose(anywhere, 0.03 / LAGS.size, rtol=1e-6)
+        assert profile.spread == pytest.approx(SIGMA * math.sqrt(SHARPNESS), rel=1e-2)
 
     def test_one_near_is_of_the_same_valley(self):
         assert not LagProfile.of([*parabola(), fit(5.9 * SIGMA, 0.0, is_apart=True)]).apart
@@ -129,3 +146,19 @@ class TestProfile:
         assert at[0.005] == pytest.approx(7.5)
         assert at[-0.03] == pytest.approx(5.0 + 0.03)
         assert at[0.1] == at[0.12] == pytest.approx(17.0)
+
+
+@pytest.mark.parametrize(
+    ("cost", "is_apart", "residual", "is_taken"),
+    [
+        (98.5, False, 12.0, True),
+        (99.5, False, 8.0, False),
+        (65.0, True, 8.0, True),
+        (75.0, True, 8.0, False),
+        (65.0, True, 12.0, False),
+    ],
+)
+def test_a_slow_sensor_is_no_better_for_the_noise_in_its_jumps(cost, is_apart, residual, is_taken):
+    """Apart, a fit must lie 30 lower than the best, and its plain sum of squares below, too."""
+    best, other = fit(0.0, 100.0, residual=10.0), fit(0.1, cost, is_apart, residual)
+    assert _lowest([best, other]) is (other if is_taken else best)

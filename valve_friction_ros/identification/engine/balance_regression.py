@@ -31,10 +31,10 @@ from valve_friction_ros.identification.engine.lags import (
     LARGEST_LAG,
     USUAL_LAG,
     LagPrior,
+    LagProfile,
     mixture_half_width,
     normal,
     share_of_timing,
-    spread_of,
 )
 from valve_friction_ros.identification.engine.numbers import RECTANGLE
 from valve_friction_ros.identification.engine.sliding_averages import (
@@ -693,12 +693,12 @@ class Posterior:
                     log = log + self._of_viscous(value)
         return np.asarray(log - log.max())
 
-    def timed(self, log_likelihood: _Array) -> "Posterior":
-        """Return the same under another likelihood of `LAGS`, which tells a lag from F_v/k."""
+    def timed(self, lags: LagProfile) -> "Posterior":
+        """Return the same with the lags of simulated stems, which tell a lag from F_v/k."""
         other = copy.copy(self)
-        other.log_likelihood = log_likelihood
-        other.probability = other.of_record = self.regression.lag.probability(log_likelihood)
-        other.information = spread_of(np.exp(log_likelihood)) ** -2.0
+        other.log_likelihood = lags.log_likelihood
+        other.probability = self.regression.lag.probability(lags.log_likelihood)
+        other.of_record, other.information = other.probability, lags.spread**-2.0
         other.exchanged = 0.0
         return other
 

@@ -179,11 +179,11 @@ class FrictionCurve:
             values["slip_force"] = float(solved.estimate[-1] / solved.scale[-1])
         return values
 
-    def timed(self, log_likelihood: _Array) -> "FrictionCurve":
-        """Return the same under another likelihood of `LAGS`, as simulated stems tell it."""
+    def timed(self, lags: LagProfile) -> "FrictionCurve":
+        """Return the same with each lag as likely as simulated stems tell it."""
         if self.posterior is None or self.posterior.regression.lag.is_known:
             return self
-        return _curve_of(self.posterior.timed(log_likelihood))
+        return _curve_of(self.posterior.timed(lags))
 
 
 def friction_curves(
@@ -444,7 +444,7 @@ def curve_numbers(curves: Sequence[FrictionCurve]) -> dict[str, Estimated]:
 def timed_numbers(curves: Sequence[FrictionCurve], lags: LagProfile | None) -> dict[str, Estimated]:
     """Return the same numbers with the lag as likely as simulated stems tell it, where they do."""
     if lags is not None and len(lags.fits) > 1:
-        curves = [one.timed(lags.log_likelihood) for one in curves]
+        curves = [one.timed(lags) for one in curves]
     return curve_numbers(curves)
 
 
@@ -467,7 +467,8 @@ def checked_by_curve(
     difference then widens the intervals of spring and preload, and those of F_c and F_v where the
     simulation does not determine F_v. Where the stem does not follow, they come from the force
     balance, and so do spring and preload where the simulation does not determine any friction: one
-    that has a lag for it has another spring, too. What both divide between dry and viscous friction
+    that has a lag for it has another spring, too; F_v that no balance tells is then unknown, as all
+    that the model lacks looks like it. What both divide between dry and viscous friction
     is uncertain by what they differ, and F_c also by a `slip_force`, N, of which no one knows at
     which speed it is gone.
     """
@@ -477,6 +478,8 @@ def checked_by_curve(
     for name in ("coulomb_friction", "viscous_friction"):
         ours, theirs = simulated.get(name), balanced.get(name)
         if ours is None or theirs is None:
+            if ours is not None and name == "viscous_friction" and not follows:
+                result[name] = replace(ours, half_width=math.inf)
             continue
         open_ = _OPEN_SLIP * slip_force if name == "coulomb_friction" else 0.0
         apart = abs(ours.value - theirs.value)

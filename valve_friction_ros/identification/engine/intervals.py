@@ -290,7 +290,7 @@ def _over_lags(
     places = {fit: numbers_at(fit.model, fit.at) for fit in (*profile.fits, *profile.apart)}
     prior = lag if lag.deviation is None else LagPrior(math.inf)
     probability = prior.probability(profile.log_likelihood)
-    unsaid = 1.0 - spread_of(probability) ** 2 / spread_of(np.exp(profile.log_likelihood)) ** 2
+    unsaid = 1.0 - spread_of(probability) ** 2 / profile.spread**2
     found = {}
     for name, first in places[best].items():
         known = {fit: numbers.get(name, first) for fit, numbers in places.items()}

@@ -57,6 +57,10 @@ _DEPENDENT = 1.5
 """Factor by which the logarithm of the likelihood of a lag is too sharp: the residuals of one move
 go together. Found on drawn valves."""
 
+_MISLED = 0.03
+"""Share of records in which the simulated stem tells a wrong lag, whatever its residual: presliding
+that it does not know, or a sensor that holds its value. Of drawn valves about so many."""
+
 _NEGLIGIBLE, _HALVINGS = 1e-6, 24
 """Probability of a lag that no interval notices; halvings by which an interval is found."""
 
@@ -227,7 +231,18 @@ class LagProfile:
 
     @cached_property
     def log_likelihood(self) -> _Array:
-        """Logarithm of the likelihood of each of `LAGS`, the likeliest at 0.
+        """Logarithm of the likelihood of each of `LAGS`, by fits that are `_MISLED` at times."""
+        anywhere = _MISLED / (1.0 - _MISLED) * float(np.mean(np.exp(self.by_fits)))
+        return np.asarray(np.logaddexp(self.by_fits, math.log(anywhere)))
+
+    @property
+    def spread(self) -> float:
+        """Deviation of the lag by the fits alone, s."""
+        return spread_of(np.exp(self.by_fits))
+
+    @cached_property
+    def by_fits(self) -> _Array:
+        """Logarithm of the likelihood of each of `LAGS` by the fits alone, the likeliest at 0.
 
         A fit may end at a kink above the least cost, never below it: the costs are those of their
         lower hull, less what the fits lie above it in the mean. Their root is linear between the

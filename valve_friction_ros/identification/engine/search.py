@@ -171,6 +171,9 @@ _DEMANDED = 30.0
 """Fall of the sum of squares, in inflated variances (5.5 standard errors), below which no record
 demands a slip, nor that of a bench a further coordinate."""
 
+_WORTH = 1.0
+"""Fall of the same by which another fit is worth going down from."""
+
 _FEW_STEPS = 6
 _MORE_STEPS = 12
 
@@ -459,21 +462,8 @@ class _Search:
         elif self.may_go_on:
             best = self.without_slip(best)
         others = self.profiled(best)
-        inflation = best.inflation
-
-        def cost(one: PosteriorFit) -> float:
-            """Take a stem behind a slow sensor for the best only where the record demands it.
-
-            Without viscous friction a stem jumps with the noise of the pressure: its halves differ,
-            which lowers the sum of their products; the plain sum of squares must fall as well.
-            """
-            if not one.is_apart:
-                return one.cost(inflation)
-            falls = one.plain_misfit < best.plain_misfit
-            return one.cost(inflation) + _DEMANDED if falls else math.inf
-
-        lowest = min(others, key=cost, default=best)
-        if cost(lowest) < cost(best) - 1.0:
+        lowest = _lowest([best, *others])
+        if lowest is not best:
             deeper = self.fit(lowest.at, best.names, _MORE_STEPS, self.exact)
             if deeper.objective < best.objective:
                 best, others = deeper, [*others, best]
@@ -557,6 +547,25 @@ def _likeliest(fits: Sequence[PosteriorFit]) -> PosteriorFit:
     """Return the fit whose residual and priors together are the least, by the same inflation."""
     inflated = min(one.inflation for one in fits)
     return min(fits, key=lambda one: one.stages[-1].misfit / inflated + one.stages[-1].penalty)
+
+
+def _lowest(fits: Sequence[PosteriorFit]) -> PosteriorFit:
+    """Return the first fit, or one that lies surely lower.
+
+    A stem behind a slow sensor is taken only where the record demands it. Without viscous friction
+    a stem jumps with the noise of the pressure: its halves differ, which lowers the sum of their
+    products; the plain sum of squares must fall as well.
+    """
+    best = fits[0]
+
+    def cost(one: PosteriorFit) -> float:
+        if not one.is_apart:
+            return one.cost(best.inflation)
+        falls = one.plain_misfit < best.plain_misfit
+        return one.cost(best.inflation) + _DEMANDED if falls else math.inf
+
+    lowest = min(fits, key=cost)
+    return lowest if cost(lowest) < cost(best) - _WORTH else best
 
 
 def _fall_at_low_speed(fit: PosteriorFit) -> float:

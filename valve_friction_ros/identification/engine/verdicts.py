@@ -195,8 +195,11 @@ def _unseen(
     settings: IdentificationSettings,
     split: str,
 ) -> dict[str, str]:
-    """Return which of mass, F_s and v_s the record does not show, and why."""
+    """Return which of mass, F_v, F_s and v_s the record does not show, and why."""
     why = {}
+    viscous = numbers.get("viscous_friction")
+    if viscous is not None and math.isinf(viscous.half_width):
+        why["viscous_friction"] = split
     mass = numbers.get("mass")
     if mass is not None and ("mass" in fit.kept or mass.half_width > abs(mass.value)):
         why["mass"] = (
