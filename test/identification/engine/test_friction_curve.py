@@ -19,7 +19,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.signal import lfilter
 
-from valve_friction_ros.identification.engine import balance_regression, friction_curve
+from valve_friction_ros.identification.engine import balance_posterior, friction_curve
 from valve_friction_ros.identification.engine.balance_regression import Regression
 from valve_friction_ros.identification.engine.friction_curve import (
     FrictionCurve,
@@ -283,7 +283,7 @@ class TestRareImperfections:
         """With all imperfections, a drift leaves the smallest friction open by far more."""
         seed = min(range(20), key=lambda one: drawn(one)[1].coulomb_friction / spring_force(one))
         narrow, truth = self.of(seed)
-        monkeypatch.setattr(balance_regression, "_RARE", ())
+        monkeypatch.setattr(balance_posterior, "_RARE", ())
         wide, _ = self.of(seed)
         assert narrow.half_width < 0.6 * wide.half_width
         assert abs(narrow.value - truth) <= narrow.half_width

@@ -30,7 +30,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from valve_friction_ros.identification.engine.balance_regression import Posterior, Regression
+from valve_friction_ros.identification.engine.balance_posterior import Posterior, posterior_of
+from valve_friction_ros.identification.engine.balance_regression import Regression
 from valve_friction_ros.identification.engine.imperfections import sensor_span, zero_drift
 from valve_friction_ros.identification.engine.intervals import ROUNDING, Budget, Estimated
 from valve_friction_ros.identification.engine.lags import LAGS, LARGEST_LAG, LagPrior, LagProfile
@@ -223,7 +224,7 @@ def friction_curves(
             averages = averages_of(force, stem, valve, time) if len(found) < most else None
             if averages is not None:
                 work = found[0].regression.work if found else Work.of(force, stem, averages)
-                found.append(Regression(averages, work, valve, lag, fixed).posterior())
+                found.append(posterior_of(Regression(averages, work, valve, lag, fixed)))
         if found:
             break
     # A lag at the end of what is possible makes up for something else.
