@@ -25,8 +25,7 @@ from benchmark.reality.package import identify
 from benchmark.reality.plants import Body, Friction, Law, Plant, Trend, move
 from benchmark.reality.plants.kernel import GRID, Loop
 from benchmark.reality.records import Nominal, Record
-from benchmark.reality.sensors import Instruments, measured
-from benchmark.reality.stamps import Stamping
+from benchmark.reality.sensors import Instruments, Stamping, measured
 from benchmark.reality.truth import truth_of
 from valve_friction_ros.identification import IdentificationSettings, RefusalError
 from valve_friction_ros.model import Excitation, SquareWave, Valve

@@ -21,8 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmark.reality.plants import Body, Friction, Plant
-from benchmark.reality.plants.constants import Constants, constants
 from benchmark.reality.plants.laws import INNER, V, X, moreau
+from benchmark.reality.plants.parameters import Constants, constants
 
 STEP = 1e-4
 FAULTS = ("healthy", "sticky", "late", "slow", "setting")

@@ -39,43 +39,31 @@ from typing import TYPE_CHECKING
 from valve_friction_ros.on_demand import names_on_demand
 
 if TYPE_CHECKING:
-    from valve_friction_ros.front_door import compare, read_recording, simulate
-    from valve_friction_ros.health.baseline import Baseline
-    from valve_friction_ros.identification.methods import identify
-    from valve_friction_ros.identification.refusal import RefusalError
-    from valve_friction_ros.identification.result import Result
-    from valve_friction_ros.identification.settings import IdentificationSettings
-    from valve_friction_ros.identification.steps.step_response import step_test
-    from valve_friction_ros.identification.steps.validation import validate
-    from valve_friction_ros.model.instruments import SensorNoise
-    from valve_friction_ros.model.karnopp_parameters import KarnoppParameters
-    from valve_friction_ros.model.recording import Recording
-    from valve_friction_ros.model.valve import Valve
-    from valve_friction_ros.records.valve_file import read_valve_file
+    from valve_friction_ros.front_door import (
+        compare as compare,
+        read_recording as read_recording,
+        simulate as simulate,
+    )
+    from valve_friction_ros.health.baseline import Baseline as Baseline
+    from valve_friction_ros.identification.methods import identify as identify
+    from valve_friction_ros.identification.refusal import RefusalError as RefusalError
+    from valve_friction_ros.identification.result import Result as Result
+    from valve_friction_ros.identification.settings import (
+        IdentificationSettings as IdentificationSettings,
+    )
+    from valve_friction_ros.identification.steps.step_response import step_test as step_test
+    from valve_friction_ros.identification.steps.validation import validate as validate
+    from valve_friction_ros.model.instruments import SensorNoise as SensorNoise
+    from valve_friction_ros.model.karnopp_parameters import KarnoppParameters as KarnoppParameters
+    from valve_friction_ros.model.recording import Recording as Recording
+    from valve_friction_ros.model.valve import Valve as Valve
+    from valve_friction_ros.records.valve_file import read_valve_file as read_valve_file
 else:
     __getattr__ = names_on_demand(__name__)
 
 __version__ = "0.1.0"
 
-__all__ = [
-    "Baseline",
-    "IdentificationSettings",
-    "KarnoppParameters",
-    "Recording",
-    "RefusalError",
-    "Result",
-    "SensorNoise",
-    "Valve",
-    "compare",
-    "identify",
-    "read_recording",
-    "read_valve_file",
-    "simulate",
-    "step_test",
-    "validate",
-]
-
 
 def __dir__() -> list[str]:
     """List the public names, loaded or not."""
-    return sorted({*globals(), *__all__})
+    return sorted({*globals(), *names_on_demand(__name__)("__all__")})

@@ -419,14 +419,12 @@ _SIZES = {"%": 1e2, "mm": 1e3, "ms": 1e3, "mm/s": 1e3}
 
 
 def _difference(change: tuple[float, float, float], unit: str) -> str:
-    """Write a difference with its interval."""
     size, digits = _SIZES.get(unit, 1.0), ".2f" if unit == "mm" else ".3g"
     value, low, high = (f"{size * one:+{digits}}" for one in change)
     return f"{' '.join(filter(None, (value, unit)))} ({low} to {high})"
 
 
 def _ratio(change: tuple[float, float, float], digits: str, times: str = "") -> str:
-    """Write a ratio with its interval."""
     value, low, high = (format(one, digits) for one in change)
     return f"{value}{times} ({low} to {high})"
 

@@ -44,14 +44,11 @@ def _shared_memory() -> tuple[int, float]:
 
 
 class _Plant:
-    """The nodes that are churned."""
-
     def __init__(self, folder: Path, ledger: Ledger) -> None:
         self._folder, self._ledger = folder, ledger
         self.processes: dict[str, Process] = {}
 
     def start(self, name: str) -> None:
-        """Start a node."""
         self.processes[name] = Process(nodes(self._folder)[name], self._folder / f"{name}.log")
 
     def watch(self, seconds: float, crowd: Crowd) -> None:

@@ -117,7 +117,6 @@ def _columns(*columns: Texts) -> list[Texts]:
 def _file(
     name: str, rows: Iterable[Texts], mark: str = ",", encoding: str = "utf-8", **known: Any
 ) -> Export:
-    """Return a file of rows, and what is known of it."""
     return Export(name, _joined(rows, mark).encode(encoding), **known)
 
 
@@ -273,7 +272,6 @@ def aspen_long(truth: Truth, random: Random) -> Export:
 
 
 def _bad_where(texts: list[str], marks: Texts, bad: str, shown: str) -> list[str]:
-    """Replace the values that are marked as bad."""
     return [shown if mark == bad else text for mark, text in zip(marks, texts, strict=True)]
 
 

@@ -147,7 +147,6 @@ class _Running:
         return processor_seconds(self._identifiers)
 
     def megabytes(self) -> float:
-        """Return the memory of its identifiers."""
         return resident_megabytes(self._identifiers)
 
 
@@ -167,7 +166,6 @@ class _Plant:
         self.valves = options.valves * len(others)
 
     def run(self, host: Host, name: str) -> _Running:
-        """Start a host."""
         kept = self.database.arguments(name) if self.database else []
         return _Running(host, name, self._options, kept)
 
@@ -181,7 +179,6 @@ class _Plant:
         return self.picture.group(one.name).silent == one.valves
 
     def is_complete(self) -> bool:
-        """Whether all hosts are shown."""
         return all(map(self.is_shown, self.hosts))
 
     def truth(self, item: str, is_met: Callable[[], bool]) -> Row:

@@ -50,7 +50,6 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _take_manual_picture(stage: Stage, browser: Browser, path: Path) -> None:
-    """Take the picture of the plant that the manual shows."""
     stage.say("the picture of the manual")
     with browser.new_context(viewport={"width": 1400, "height": 700}) as context:
         page = context.new_page()

@@ -91,7 +91,6 @@ class _Visitor:
             tab.context.close()
 
     def close(self) -> None:
-        """Close all tabs."""
         for tab in self._tabs:
             tab.context.close()
         self._tabs.clear()

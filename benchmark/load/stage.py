@@ -63,7 +63,6 @@ class Stage:
         self._template = folder / "status.cdr"
 
     def _start(self, name: str, *arguments: str) -> Process:
-        """Start a module of Python."""
         log = self.folder / f"{name.rpartition('.')[2]}_{len(self.processes) + 1}.log"
         made = Process(module(name, *arguments), log)
         self.processes.append(made)

@@ -17,8 +17,7 @@ from typing import Any
 import numpy as np
 
 from benchmark.reality.plants import Law, Trend
-from benchmark.reality.sensors import Instruments, Sensor
-from benchmark.reality.stamps import Stamping
+from benchmark.reality.sensors import Instruments, Sensor, Stamping
 from benchmark.reality.valves import DrawnValve, log_uniform
 
 _RATES = (100.0, 200.0, 500.0, 1000.0)

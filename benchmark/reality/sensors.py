@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""What the sensors and their messages make of the true signals."""
+"""What the sensors and their messages make of the true signals, and what time they bear."""
 
 import math
 from dataclasses import dataclass, field
@@ -19,7 +19,59 @@ from scipy.signal import lfilter
 
 from benchmark.reality.plants.kernel import GRID
 from benchmark.reality.plants.motion import Motion
-from benchmark.reality.stamps import Stamping, Times, sampling_times, stamped
+
+
+@dataclass(frozen=True)
+class Stamping:
+    """The clock of one signal."""
+
+    rate: float = 1000.0  # samples a second
+    # Largest shift of an instant from its place, share of the period; the stamp is right.
+    jitter: float = 0.0
+    stamp_error: float = 0.0  # largest error of a stamp, s, to either side, each for itself
+    offset: float = 0.0  # time by which the stamps are late, s
+    drops: float = 0.0  # share of the messages that are lost, each for itself
+    # Number and length (s) of the pauses in which all messages are lost.
+    bursts: int = 0
+    burst: float = 0.0
+    resolution: float = 0.0  # step to which stamps are cut, s; 0: a nanosecond
+
+
+class Times(NamedTuple):
+    """Instants of a signal."""
+
+    period: float  # nominal time between two samples, s
+    # When the samples were taken, s from the begin of the record, shape (n,).
+    taken: NDArray[np.float64]
+    written: NDArray[np.float64]  # what the clock said then, s, shape (n,)
+    lost: NDArray[np.bool_]  # whether the message is lost, shape (n,)
+
+
+def sampling_times(stamping: Stamping, duration: float, random: np.random.Generator) -> Times:
+    """Return the instants of a record of `duration` seconds."""
+    period = 1.0 / stamping.rate
+    count = int(duration / period)
+    steps = np.arange(count, dtype=np.float64)
+    if stamping.jitter > 0.0:
+        steps += stamping.jitter * random.uniform(-1.0, 1.0, count)
+    taken = np.clip(steps * period, 0.0, duration)
+    written = taken
+    if stamping.stamp_error > 0.0:
+        written = taken + stamping.stamp_error * random.uniform(-1.0, 1.0, count)
+        written = np.maximum.accumulate(written)
+    lost = random.random(count) < stamping.drops
+    for begin in random.uniform(0.05, 0.95, stamping.bursts) * (duration - stamping.burst):
+        lost |= (taken >= begin) & (taken < begin + stamping.burst)
+    return Times(period, taken, written, lost)
+
+
+def stamped(stamping: Stamping, written: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Return the stamps, ns, with which a clock writes its times (s)."""
+    stamps: NDArray[np.int64] = np.rint((written + stamping.offset) * 1e9).astype(np.int64)
+    if stamping.resolution > 0.0:
+        unit = round(stamping.resolution * 1e9)
+        stamps -= stamps % unit
+    return stamps
 
 
 class Signal(NamedTuple):

@@ -130,7 +130,6 @@ def _within(limit: float, job: Callable[[], _T]) -> tuple[_T | None, str, float]
 
 
 def _row(task: Task, case: Case, record: Record) -> tuple[Row, Answer]:
-    """Identify a record."""
     answer, failure, seconds = _within(task.limit, lambda: package.identify(record))
     answer = answer or Answer()
     stamps = record.position.stamps

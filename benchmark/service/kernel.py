@@ -18,10 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmark.reality.plants import laws
-from benchmark.reality.plants.constants import ELEMENTS, Constants
 from benchmark.reality.plants.kernel import stem_pull
 from benchmark.reality.plants.laws import INNER, V, X
-from benchmark.reality.plants.parameters import Law
+from benchmark.reality.plants.parameters import ELEMENTS, Constants, Law
 
 SUMS = 2
 """Sums over the motion: ∫|dx| and ∫|F·dx|."""
@@ -93,7 +92,6 @@ def _rest(
 
 @numba.njit
 def _act(loop: Loop, whole: NDArray[np.float64], error: float) -> None:
-    """Let the controller act on an error."""
     rate = loop.gain * error / loop.integral_time
     integral = whole[_INTEGRAL] + rate * loop.action_period
     whole[_INTEGRAL] = min(max(integral, _LOWEST), _HIGHEST)

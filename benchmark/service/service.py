@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmark.reality.plants.constants import constants
+from benchmark.reality.plants.parameters import constants
 from benchmark.service.kernel import SUMS, new_state, runner_of
 from benchmark.service.plants import Duty, Senses, ServiceValve
 

@@ -15,8 +15,8 @@ from collections import deque
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
-from benchmark.reality.plants.constants import constants
 from benchmark.reality.plants.kernel import stem_pull
+from benchmark.reality.plants.parameters import constants
 from benchmark.service.course import BEFORE, PER_HOUR, Course, Served, Task, known_valve, served
 from benchmark.service.plants import ServiceValve, valve_of
 from valve_friction_ros.evidence import MOST_MOVES, Evidence, Move, evidence_of

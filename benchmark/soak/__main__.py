@@ -77,8 +77,6 @@ def _processes(folder: Path, disk: Path, url: str) -> list[Process]:
 
 
 class _Month:
-    """The month under way."""
-
     def __init__(self, site: Site, seconds: float) -> None:
         self._site, self._seconds = site, seconds
         self._begin, self._month_begin = time.monotonic(), time.time_ns() - _MONTH
@@ -90,7 +88,6 @@ class _Month:
 
     @property
     def share(self) -> float:
-        """Share of the month that is over."""
         return (time.monotonic() - self._begin) / self._seconds
 
     def turn(self) -> None:

@@ -16,8 +16,7 @@ import pytest
 
 from benchmark.reality.plants.kernel import GRID
 from benchmark.reality.plants.motion import Motion
-from benchmark.reality.sensors import Instruments, Sensor, measured
-from benchmark.reality.stamps import Stamping
+from benchmark.reality.sensors import Instruments, Sensor, Stamping, measured
 
 DURATION = 20.0
 

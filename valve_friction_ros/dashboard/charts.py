@@ -55,7 +55,6 @@ def _base() -> Options:
 
 
 def _axis(kind: str, name: str, **more: Any) -> Options:
-    """Return an axis of a kind of ECharts."""
     return {
         "type": kind,
         "name": name,

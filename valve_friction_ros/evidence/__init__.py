@@ -9,17 +9,23 @@
 
 """Evidence that adds up: moves of a valve in service, and what they say together; no ROS."""
 
-from valve_friction_ros.evidence.estimate import MOST_MOVES, Evidence, FrictionChange, evidence_of
-from valve_friction_ros.evidence.moves import Move, Moves, MoveStream, is_clock_reset, stamp_problem
+from typing import TYPE_CHECKING
 
-__all__ = [
-    "MOST_MOVES",
-    "Evidence",
-    "FrictionChange",
-    "Move",
-    "MoveStream",
-    "Moves",
-    "evidence_of",
-    "is_clock_reset",
-    "stamp_problem",
-]
+from valve_friction_ros.on_demand import names_on_demand
+
+if TYPE_CHECKING:
+    from valve_friction_ros.evidence.estimate import (
+        MOST_MOVES as MOST_MOVES,
+        Evidence as Evidence,
+        FrictionChange as FrictionChange,
+        evidence_of as evidence_of,
+    )
+    from valve_friction_ros.evidence.moves import (
+        Move as Move,
+        Moves as Moves,
+        MoveStream as MoveStream,
+        is_clock_reset as is_clock_reset,
+        stamp_problem as stamp_problem,
+    )
+else:
+    __getattr__ = names_on_demand(__name__)

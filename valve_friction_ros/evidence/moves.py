@@ -578,7 +578,6 @@ class MoveStream:
         return True
 
     def _look(self, position: NDArray[np.float64], period: float) -> None:
-        """Follow the noise of the position."""
         most = max(round(_BAND_MEMORY / period), 50)
         self._seen = np.concatenate((self._seen, position))[-most:]
         self._count += position.size

@@ -9,23 +9,23 @@
 
 """Figures of records and identifications; no ROS."""
 
-from valve_friction_ros.figures.history_figures import trend_figure
-from valve_friction_ros.figures.panels import Case, draw_curves, require_picture_file, save_picture
-from valve_friction_ros.figures.record_figures import (
-    friction_figure,
-    identification_figure,
-    plan_figure,
-    validation_figure,
-)
+from typing import TYPE_CHECKING
 
-__all__ = [
-    "Case",
-    "draw_curves",
-    "friction_figure",
-    "identification_figure",
-    "plan_figure",
-    "require_picture_file",
-    "save_picture",
-    "trend_figure",
-    "validation_figure",
-]
+from valve_friction_ros.on_demand import names_on_demand
+
+if TYPE_CHECKING:
+    from valve_friction_ros.figures.history_figures import trend_figure as trend_figure
+    from valve_friction_ros.figures.panels import (
+        Case as Case,
+        draw_curves as draw_curves,
+        require_picture_file as require_picture_file,
+        save_picture as save_picture,
+    )
+    from valve_friction_ros.figures.record_figures import (
+        friction_figure as friction_figure,
+        identification_figure as identification_figure,
+        plan_figure as plan_figure,
+        validation_figure as validation_figure,
+    )
+else:
+    __getattr__ = names_on_demand(__name__)

@@ -158,7 +158,6 @@ def _draw_limits(axes: Axes, history: ValveHistory, span: tuple[int, int]) -> No
 
 
 def _what(history: ValveHistory) -> str:
-    """Return what is drawn, in words."""
     baseline = history.entries[-1].baseline
     if baseline is None or baseline.sliding is None:
         return "Coulomb friction $F_c$"

@@ -266,7 +266,6 @@ def draw_signature(axes: Axes, cases: Sequence[Case]) -> None:
 
 
 def _told(parameter: Parameter) -> str:
-    """Return a parameter and its verdict as text."""
     symbol = SYMBOLS.get(parameter.name, parameter.name)
     if math.isnan(parameter.value):
         return f"${symbol}$ {parameter.verdict.value}"

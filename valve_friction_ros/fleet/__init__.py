@@ -9,29 +9,37 @@
 
 """Many recordings identified by many processes into one file; no ROS."""
 
-from valve_friction_ros.fleet.cluster import Cluster, cluster_at, in_cluster
-from valve_friction_ros.fleet.job import Job, Options, identify_job, identify_job_elsewhere
-from valve_friction_ros.fleet.plant import read_plant
-from valve_friction_ros.fleet.processes import DeadWorker, in_processes, usable_cores
-from valve_friction_ros.fleet.recordings import Baselines, Findings, find_recordings, read_baselines
-from valve_friction_ros.fleet.results_file import RecordingRows, ResultsFile
+from typing import TYPE_CHECKING
 
-__all__ = [
-    "Baselines",
-    "Cluster",
-    "DeadWorker",
-    "Findings",
-    "Job",
-    "Options",
-    "RecordingRows",
-    "ResultsFile",
-    "cluster_at",
-    "find_recordings",
-    "identify_job",
-    "identify_job_elsewhere",
-    "in_cluster",
-    "in_processes",
-    "read_baselines",
-    "read_plant",
-    "usable_cores",
-]
+from valve_friction_ros.on_demand import names_on_demand
+
+if TYPE_CHECKING:
+    from valve_friction_ros.fleet.cluster import (
+        Cluster as Cluster,
+        cluster_at as cluster_at,
+        in_cluster as in_cluster,
+    )
+    from valve_friction_ros.fleet.job import (
+        Job as Job,
+        Options as Options,
+        identify_job as identify_job,
+        identify_job_elsewhere as identify_job_elsewhere,
+    )
+    from valve_friction_ros.fleet.plant import read_plant as read_plant
+    from valve_friction_ros.fleet.processes import (
+        DeadWorker as DeadWorker,
+        in_processes as in_processes,
+        usable_cores as usable_cores,
+    )
+    from valve_friction_ros.fleet.recordings import (
+        Baselines as Baselines,
+        Findings as Findings,
+        find_recordings as find_recordings,
+        read_baselines as read_baselines,
+    )
+    from valve_friction_ros.fleet.results_file import (
+        RecordingRows as RecordingRows,
+        ResultsFile as ResultsFile,
+    )
+else:
+    __getattr__ = names_on_demand(__name__)

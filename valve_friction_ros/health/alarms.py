@@ -320,7 +320,6 @@ _LONGEST = {AlarmAction.SHELVE: LONGEST_SHELVING, AlarmAction.TAKE_OUT: LONGEST_
 
 
 def _stepped(alarm: Alarm, action: AlarmAction, time: int, condition: Condition) -> AlarmEvent:
-    """Return the event of an action of the valve or the clock."""
     state = TRANSITIONS[alarm.state, action]
     if state is None:
         state = AlarmState.UNACKNOWLEDGED if condition.level else AlarmState.NORMAL

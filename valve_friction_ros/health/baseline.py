@@ -275,7 +275,6 @@ class Baseline:
 
 
 def _frictions(result: Result) -> dict[str, Parameter]:
-    """Return the frictions of a result that may be a baseline."""
     names = ["coulomb_friction"]
     if SLIDING in result.parameters and result.sliding_speed > 0:
         names.append(SLIDING)
@@ -288,7 +287,6 @@ def _lacks(frictions: Mapping[str, Parameter]) -> dict[str, BaselineLack]:
 
 
 def _why_not(friction: Parameter, lack: BaselineLack) -> str:
-    """Return why a friction cannot be a baseline, with its numbers."""
     name = friction.name.replace("_", " ")
     if lack.lack is Lack.VALUE:
         return f"{name} is not identifiable ({friction.reason})"

@@ -497,7 +497,6 @@ def _not_identifiable(friction: Parameter) -> Statement:
 
 
 def _why_not_compared(one: Parameter, result: Frictions, baseline: Baseline) -> Statement:
-    """Return why a friction of a result is not compared with a baseline."""
     if math.isnan(one.value):
         return _not_identifiable(one)
     if one.name == SLIDING and baseline.sliding is not None:

@@ -23,15 +23,13 @@ from typing import TYPE_CHECKING
 from valve_friction_ros.on_demand import names_on_demand
 
 if TYPE_CHECKING:
-    from valve_friction_ros.nodes.dashboard.node import Dashboard
-    from valve_friction_ros.nodes.identifier.node import Identifier
-    from valve_friction_ros.nodes.pressure_source import PressureSource
-    from valve_friction_ros.nodes.simulator import Simulator
-    from valve_friction_ros.nodes.stroke_player import StrokePlayer
+    from valve_friction_ros.nodes.dashboard.node import Dashboard as Dashboard
+    from valve_friction_ros.nodes.identifier.node import Identifier as Identifier
+    from valve_friction_ros.nodes.pressure_source import PressureSource as PressureSource
+    from valve_friction_ros.nodes.simulator import Simulator as Simulator
+    from valve_friction_ros.nodes.stroke_player import StrokePlayer as StrokePlayer
 else:
     __getattr__ = names_on_demand(__name__)
-
-__all__ = ["Dashboard", "Identifier", "PressureSource", "Simulator", "StrokePlayer"]
 
 # Read when numpy is imported: more threads only wait for each other in matrices as small as these.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")

@@ -154,7 +154,6 @@ class PlayedTest:
         return Abort[name.upper()]
 
     def _doubt(self, now: float) -> Abort | None:
-        """Return what is wrong with the signals now."""
         for name, silent in (
             ("position", Abort.SILENT_STEM),
             ("pressure", Abort.SILENT_PRESSURE),

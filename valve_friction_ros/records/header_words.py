@@ -101,7 +101,6 @@ def known_unit(text: str) -> str:
 
 
 def _unit_and_rest(text: str) -> tuple[str, str]:
-    """Return the unit in a header, and the header without it."""
     for found in reversed(list(_BRACKETS.finditer(text))):
         if unit := known_unit(found[1]):
             return unit, text[: found.start()] + " " + text[found.end() :]

@@ -126,7 +126,6 @@ class _Bounded(io.RawIOBase):
         return True
 
     def close(self) -> None:
-        """Close the file."""
         if not self.closed:
             self._stream.close()
             self._file.close()

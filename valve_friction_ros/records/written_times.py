@@ -263,7 +263,6 @@ class WrittenTimes:
         return times.tz_localize(None) if is_utc else times
 
     def _localized(self, times: "pd.DatetimeIndex") -> NDArray[np.int64]:
-        """Return local times as UTC."""
         naive = _ns(times)
         if not self._form.zone:
             return naive

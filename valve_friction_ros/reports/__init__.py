@@ -9,41 +9,32 @@
 
 """Reports for people: pages that stand in one file; no ROS."""
 
-from valve_friction_ros.reports.identification_report import (
-    identification_report,
-    write_identification_report,
-)
-from valve_friction_ros.reports.identified_record import IdentifiedRecord, diagnosis_sentence
-from valve_friction_ros.reports.page import (
-    Block,
-    Colour,
-    Column,
-    Conclusion,
-    Page,
-    PageTable,
-    Paragraph,
-    Picture,
-    Section,
-    render,
-    require_report_file,
-    write_report,
-)
+from typing import TYPE_CHECKING
 
-__all__ = [
-    "Block",
-    "Colour",
-    "Column",
-    "Conclusion",
-    "IdentifiedRecord",
-    "Page",
-    "PageTable",
-    "Paragraph",
-    "Picture",
-    "Section",
-    "diagnosis_sentence",
-    "identification_report",
-    "render",
-    "require_report_file",
-    "write_identification_report",
-    "write_report",
-]
+from valve_friction_ros.on_demand import names_on_demand
+
+if TYPE_CHECKING:
+    from valve_friction_ros.reports.identification_report import (
+        identification_report as identification_report,
+        write_identification_report as write_identification_report,
+    )
+    from valve_friction_ros.reports.identified_record import (
+        IdentifiedRecord as IdentifiedRecord,
+        diagnosis_sentence as diagnosis_sentence,
+    )
+    from valve_friction_ros.reports.page import (
+        Block as Block,
+        Colour as Colour,
+        Column as Column,
+        Conclusion as Conclusion,
+        Page as Page,
+        PageTable as PageTable,
+        Paragraph as Paragraph,
+        Picture as Picture,
+        Section as Section,
+        render as render,
+        require_report_file as require_report_file,
+        write_report as write_report,
+    )
+else:
+    __getattr__ = names_on_demand(__name__)

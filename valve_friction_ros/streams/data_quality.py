@@ -284,8 +284,6 @@ class _Batch(NamedTuple):
 
 
 class _SignalQuality:
-    """What is known of one signal."""
-
     def __init__(self) -> None:
         self._batches: deque[_Batch] = deque()
         self._is_bad = dict.fromkeys((FaultKind.REJECTED, FaultKind.OUTSIDE_TRAVEL), False)

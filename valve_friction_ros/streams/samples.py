@@ -403,7 +403,6 @@ def _silences(samples: Samples) -> NDArray[np.bool_]:
 
 
 def _gap(name: str, samples: Samples, period: int) -> Gap | None:
-    """Return the longest gap of a signal, if it has one."""
     pauses = np.where(_silences(samples), 0, np.diff(samples.stamps))
     longest = int(np.argmax(pauses))
     if pauses[longest] <= _LARGEST_GAP * period:

@@ -17,9 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmark.reality.plants import laws
-from benchmark.reality.plants.constants import ELEMENTS, Constants
 from benchmark.reality.plants.laws import INNER, SLIDING, V, X
-from benchmark.reality.plants.parameters import Law
+from benchmark.reality.plants.parameters import ELEMENTS, Constants, Law
 
 GRID = 1e-4
 """Time between two points of the simulated signals, s."""

@@ -21,7 +21,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmark.reality.plants.constants import ELEMENTS, Constants
+from benchmark.reality.plants.parameters import ELEMENTS, Constants
 
 X, V, SLIDING, INNER = 0, 1, 2, 3
 """Places in the state: position, speed, broken away, and the first inner number."""

@@ -14,9 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmark.reality.plants.constants import STEPS, constants
 from benchmark.reality.plants.kernel import GRID, SUMS, Loop, runner_of
-from benchmark.reality.plants.parameters import Plant
+from benchmark.reality.plants.parameters import STEPS, Plant, constants
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,6 +13,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from types import MappingProxyType
+from typing import NamedTuple
+
+import numpy as np
 
 PRESSURE_RANGE = (41740.0, 206840.0)
 """Pressure of the converter at 0 % and 100 % of its input, Pa."""
@@ -151,3 +154,71 @@ PACKINGS: Mapping[str, Plant] = MappingProxyType(
     }
 )
 """The paper's bench valve, lightly and strongly tightened, and with a graphite packing."""
+
+STEPS = {
+    Law.MOREAU: 5e-6,
+    Law.KARNOPP: 5e-6,
+    Law.LATCHED: 5e-6,
+    Law.LUGRE: 4e-6,
+    Law.MAXWELL: 2.5e-6,
+}
+"""Time step of each law, s."""
+
+ELEMENTS = 6
+"""Springs of the Maxwell law."""
+
+_BRISTLE_DAMPING = 0.7
+"""Damping ratio of stem and bristle before sliding."""
+
+
+class Constants(NamedTuple):
+    """A plant as plain numbers, the form in which compiled code takes it; SI units.
+
+    See `Body` and `Friction` for their meaning.
+    """
+
+    mass: float
+    spring: float
+    preload: float
+    spring_curve: float
+    area: float
+    area_change: float
+    pressure_reference: float
+    flow_force: float
+    flow_exponent: float
+    travel: float
+    lowest: float
+    highest: float
+    volume_lag: float
+    coulomb: float
+    static: float
+    viscous: float
+    stribeck_velocity: float
+    limit_velocity: float
+    asymmetry: float
+    along_change: float
+    along_bend: float
+    record_change: float
+    record_bend: float
+    stiffness: float
+    bristle_damping: float
+
+
+def constants(plant: Plant) -> Constants:
+    """Return the numbers of a plant."""
+    body, friction = plant.body, plant.friction
+    bends = friction.law in (Law.LUGRE, Law.MAXWELL)
+    stiffness = friction.static / friction.presliding if bends else 0.0
+    numbers = {
+        **vars(body),
+        **vars(friction),
+        "lowest": body.seat,
+        "highest": body.travel - body.top,
+        "along_change": friction.along_travel.change,
+        "along_bend": friction.along_travel.bend,
+        "record_change": friction.in_record.change,
+        "record_bend": friction.in_record.bend,
+        "stiffness": stiffness,
+        "bristle_damping": 2 * _BRISTLE_DAMPING * float(np.sqrt(stiffness * body.mass)),
+    }
+    return Constants(**{name: numbers[name] for name in Constants._fields})

@@ -9,6 +9,4 @@
 
 """Sub-command `demo`: a simulated valve whose friction grows."""
 
-from valve_friction_ros.commands.demo.command import REFUSALS, run
-
-__all__ = ["REFUSALS", "run"]
+from valve_friction_ros.commands.demo.command import REFUSALS as REFUSALS, run as run

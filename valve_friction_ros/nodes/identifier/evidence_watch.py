@@ -459,5 +459,4 @@ class EvidenceWatch:
 
 
 def _combined_by(settings: MonitorSettings) -> tuple[Valve, IdentificationSettings]:
-    """Return what of the settings the evidence depends on."""
     return settings.valve, settings.identification

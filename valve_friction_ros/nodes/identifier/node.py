@@ -464,7 +464,6 @@ class Identifier(ManagedNode):
         return values
 
     def _level(self) -> Level:
-        """Return the level of the valve, with all that is found on it."""
         return self._worst(one for watch in self._watches for one in watch.findings())
 
     def _worst(self, findings: Iterable[Finding]) -> Level:
