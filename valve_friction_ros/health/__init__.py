@@ -9,107 +9,100 @@
 
 """Health of a valve: its baseline, its diagnosis, and the monitor of one valve; no ROS."""
 
-from typing import TYPE_CHECKING
-
-from valve_friction_ros.on_demand import names_on_demand
-
-if TYPE_CHECKING:
-    from valve_friction_ros.health.alarm_conditions import (
-        Delay as Delay,
-        FrictionHold as FrictionHold,
-    )
-    from valve_friction_ros.health.alarm_digest import (
-        AlarmDigest as AlarmDigest,
-        DigestDesk as DigestDesk,
-    )
-    from valve_friction_ros.health.alarms import (
-        Alarm as Alarm,
-        AlarmAction as AlarmAction,
-        AlarmError as AlarmError,
-        AlarmEvent as AlarmEvent,
-        AlarmKind as AlarmKind,
-        AlarmRequest as AlarmRequest,
-        AlarmState as AlarmState,
-        Condition as Condition,
-    )
-    from valve_friction_ros.health.baseline import (
-        Baseline as Baseline,
-        BaselineLack as BaselineLack,
-        BaselineRefusalError as BaselineRefusalError,
-        Lack as Lack,
-        SlidingFriction as SlidingFriction,
-    )
-    from valve_friction_ros.health.by_evidence import (
-        Reference as Reference,
-        baseline_by_evidence as baseline_by_evidence,
-        diagnosis_by_evidence as diagnosis_by_evidence,
-        lack_of_moves as lack_of_moves,
-        reference_by_evidence as reference_by_evidence,
-        why_not_compared as why_not_compared,
-    )
-    from valve_friction_ros.health.common_factor import (
-        drive_scale as drive_scale,
-        explains as explains,
-        qualified as qualified,
-    )
-    from valve_friction_ros.health.comparison import (
-        Comparison as Comparison,
-        Ratio as Ratio,
-        carried as carried,
-        compared as compared,
-        friction_name as friction_name,
-    )
-    from valve_friction_ros.health.diagnosis import (
-        Diagnosis as Diagnosis,
-        EarlierEstimate as EarlierEstimate,
-        FrictionLimits as FrictionLimits,
-        FrictionState as FrictionState,
-        Side as Side,
-        StandingAlarm as StandingAlarm,
-        dead_band as dead_band,
-        dead_band_half_width as dead_band_half_width,
-        diagnose as diagnose,
-        diagnose_again as diagnose_again,
-        leading_ratio as leading_ratio,
-    )
-    from valve_friction_ros.health.friction_monitor import (
-        FrictionMonitor as FrictionMonitor,
-        IdentificationInput as IdentificationInput,
-        MonitorSettings as MonitorSettings,
-        identify_snapshot as identify_snapshot,
-        identify_with_numbers as identify_with_numbers,
-    )
-    from valve_friction_ros.health.known_numbers import KnownNumbers as KnownNumbers
-    from valve_friction_ros.health.levels import (
-        Finding as Finding,
-        Level as Level,
-        StatusSignal as StatusSignal,
-        by_severity as by_severity,
-    )
-    from valve_friction_ros.health.measured import DatedNumber as DatedNumber, Measured as Measured
-    from valve_friction_ros.health.refused_record import RefusedRecordError as RefusedRecordError
-    from valve_friction_ros.health.standstill import (
-        Standstill as Standstill,
-        StandstillCounter as StandstillCounter,
-        standstill_finding as standstill_finding,
-    )
-    from valve_friction_ros.health.survey import (
-        Survey as Survey,
-        SurveyLimits as SurveyLimits,
-        surveyed as surveyed,
-    )
-    from valve_friction_ros.health.valve_changes import valve_changes as valve_changes
-    from valve_friction_ros.health.valve_diagnosis import (
-        ValveDiagnosis as ValveDiagnosis,
-        diagnose_numbers as diagnose_numbers,
-        diagnose_parameters as diagnose_parameters,
-        diagnose_valve as diagnose_valve,
-    )
-    from valve_friction_ros.health.valve_limits import ValveLimits as ValveLimits
-    from valve_friction_ros.health.valve_numbers import (
-        OF_ONE_RESULT as OF_ONE_RESULT,
-        comparable_numbers as comparable_numbers,
-        valve_numbers as valve_numbers,
-    )
-else:
-    __getattr__ = names_on_demand(__name__)
+from valve_friction_ros.health.alarm_conditions import (
+    Delay as Delay,
+    FrictionHold as FrictionHold,
+)
+from valve_friction_ros.health.alarm_digest import (
+    AlarmDigest as AlarmDigest,
+    DigestDesk as DigestDesk,
+)
+from valve_friction_ros.health.alarms import (
+    Alarm as Alarm,
+    AlarmAction as AlarmAction,
+    AlarmError as AlarmError,
+    AlarmEvent as AlarmEvent,
+    AlarmKind as AlarmKind,
+    AlarmRequest as AlarmRequest,
+    AlarmState as AlarmState,
+    Condition as Condition,
+)
+from valve_friction_ros.health.baseline import (
+    Baseline as Baseline,
+    BaselineLack as BaselineLack,
+    BaselineRefusalError as BaselineRefusalError,
+    Lack as Lack,
+    SlidingFriction as SlidingFriction,
+)
+from valve_friction_ros.health.by_evidence import (
+    Reference as Reference,
+    baseline_by_evidence as baseline_by_evidence,
+    diagnosis_by_evidence as diagnosis_by_evidence,
+    lack_of_moves as lack_of_moves,
+    reference_by_evidence as reference_by_evidence,
+    why_not_compared as why_not_compared,
+)
+from valve_friction_ros.health.common_factor import (
+    drive_scale as drive_scale,
+    explains as explains,
+    qualified as qualified,
+)
+from valve_friction_ros.health.comparison import (
+    Comparison as Comparison,
+    Ratio as Ratio,
+    carried as carried,
+    compared as compared,
+    friction_name as friction_name,
+)
+from valve_friction_ros.health.diagnosis import (
+    Diagnosis as Diagnosis,
+    EarlierEstimate as EarlierEstimate,
+    FrictionLimits as FrictionLimits,
+    FrictionState as FrictionState,
+    Side as Side,
+    StandingAlarm as StandingAlarm,
+    dead_band as dead_band,
+    dead_band_half_width as dead_band_half_width,
+    diagnose as diagnose,
+    diagnose_again as diagnose_again,
+    leading_ratio as leading_ratio,
+)
+from valve_friction_ros.health.friction_monitor import (
+    FrictionMonitor as FrictionMonitor,
+    IdentificationInput as IdentificationInput,
+    MonitorSettings as MonitorSettings,
+    identify_snapshot as identify_snapshot,
+    identify_with_numbers as identify_with_numbers,
+)
+from valve_friction_ros.health.known_numbers import KnownNumbers as KnownNumbers
+from valve_friction_ros.health.levels import (
+    Finding as Finding,
+    Level as Level,
+    StatusSignal as StatusSignal,
+    by_severity as by_severity,
+)
+from valve_friction_ros.health.measured import DatedNumber as DatedNumber, Measured as Measured
+from valve_friction_ros.health.refused_record import RefusedRecordError as RefusedRecordError
+from valve_friction_ros.health.standstill import (
+    Standstill as Standstill,
+    StandstillCounter as StandstillCounter,
+    standstill_finding as standstill_finding,
+)
+from valve_friction_ros.health.survey import (
+    Survey as Survey,
+    SurveyLimits as SurveyLimits,
+    surveyed as surveyed,
+)
+from valve_friction_ros.health.valve_changes import valve_changes as valve_changes
+from valve_friction_ros.health.valve_diagnosis import (
+    ValveDiagnosis as ValveDiagnosis,
+    diagnose_numbers as diagnose_numbers,
+    diagnose_parameters as diagnose_parameters,
+    diagnose_valve as diagnose_valve,
+)
+from valve_friction_ros.health.valve_limits import ValveLimits as ValveLimits
+from valve_friction_ros.health.valve_numbers import (
+    OF_ONE_RESULT as OF_ONE_RESULT,
+    comparable_numbers as comparable_numbers,
+    valve_numbers as valve_numbers,
+)

@@ -9,32 +9,25 @@
 
 """Reports for people: pages that stand in one file; no ROS."""
 
-from typing import TYPE_CHECKING
-
-from valve_friction_ros.on_demand import names_on_demand
-
-if TYPE_CHECKING:
-    from valve_friction_ros.reports.identification_report import (
-        identification_report as identification_report,
-        write_identification_report as write_identification_report,
-    )
-    from valve_friction_ros.reports.identified_record import (
-        IdentifiedRecord as IdentifiedRecord,
-        diagnosis_sentence as diagnosis_sentence,
-    )
-    from valve_friction_ros.reports.page import (
-        Block as Block,
-        Colour as Colour,
-        Column as Column,
-        Conclusion as Conclusion,
-        Page as Page,
-        PageTable as PageTable,
-        Paragraph as Paragraph,
-        Picture as Picture,
-        Section as Section,
-        render as render,
-        require_report_file as require_report_file,
-        write_report as write_report,
-    )
-else:
-    __getattr__ = names_on_demand(__name__)
+from valve_friction_ros.reports.identification_report import (
+    identification_report as identification_report,
+    write_identification_report as write_identification_report,
+)
+from valve_friction_ros.reports.identified_record import (
+    IdentifiedRecord as IdentifiedRecord,
+    diagnosis_sentence as diagnosis_sentence,
+)
+from valve_friction_ros.reports.page import (
+    Block as Block,
+    Colour as Colour,
+    Column as Column,
+    Conclusion as Conclusion,
+    Page as Page,
+    PageTable as PageTable,
+    Paragraph as Paragraph,
+    Picture as Picture,
+    Section as Section,
+    render as render,
+    require_report_file as require_report_file,
+    write_report as write_report,
+)
