@@ -20,7 +20,6 @@ from dataclasses import dataclass
 from datetime import datetime, timezone
 from itertools import groupby
 from pathlib import Path
-from types import TracebackType
 from typing import Any, NamedTuple
 from urllib.parse import quote
 
@@ -68,7 +67,7 @@ def reports_of(output: Path) -> Path:
     return output.resolve().with_name(f"{output.resolve().stem}_reports")
 
 
-class ResultsFile:
+class ResultsFile(contextlib.AbstractContextManager["ResultsFile"]):
     """Rows that are on the disk when `append` returns; leaving the context writes the outputs.
 
     They are kept in the table ``result`` of `database_of` the first output, in its columns and in
@@ -117,15 +116,7 @@ class ResultsFile:
                 self._connection.execute(f"ALTER TABLE result ADD COLUMN {name}")
         self._connection.commit()
 
-    def __enter__(self) -> "ResultsFile":
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """Write the outputs and close the database."""
         try:
             for output, write in self._outputs.items():
