@@ -27,7 +27,6 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from benchmark.alarms import GROWTH, AlarmCounts, diagnosed
 from benchmark.bounds import (
-    Bound,
     alarm_bounds,
     by_case,
     case_bounds,
@@ -36,6 +35,7 @@ from benchmark.bounds import (
 )
 from benchmark.cases import CONDITIONS, EXCITATIONS, NOISES, Case
 from benchmark.emps import emps_bounds
+from benchmark.harness.rows import Bound
 from benchmark.information import Information, information
 from benchmark.plants import PLANTS
 from benchmark.report import bounds_table, cases_table, draw, information_table

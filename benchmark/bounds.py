@@ -10,12 +10,13 @@
 """What an identification must reach, checked on the outcomes."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from benchmark.alarms import AlarmCounts
 from benchmark.cases import Case
+from benchmark.harness.rows import Bound
 from benchmark.runs import Outcome, wrong_claims
 from valve_friction_ros.identification import Verdict
 
@@ -32,25 +33,6 @@ _SQUARE = {
 }
 _MOST_FALSE_ALARMS = 0.01
 _LEAST_DECLARED = 0.99
-
-
-@dataclass(frozen=True)
-class Bound:
-    """One requirement, what was reached, and whether that is enough.
-
-    Attributes
-    ----------
-    what : str
-        The requirement.
-    reached : str
-        The figure reached.
-    met : bool
-        Whether it is met.
-    """
-
-    what: str
-    reached: str
-    met: bool
 
 
 def by_case(outcomes: Sequence[Outcome]) -> dict[Case, list[Outcome]]:

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmark.bounds import Bound
+from benchmark.harness.rows import Bound
 from valve_friction_ros.identification import IdentificationSettings, Verdict, identify
 from valve_friction_ros.model import Drive, Recording, Valve
 

@@ -20,7 +20,8 @@ from matplotlib.figure import Figure
 from rich.table import Table
 
 from benchmark.alarms import AlarmCounts
-from benchmark.bounds import COVERAGE, FORCE_BOUND, Bound, by_case, case_bounds, coverage_of, worst
+from benchmark.bounds import COVERAGE, FORCE_BOUND, by_case, case_bounds, coverage_of, worst
+from benchmark.harness.rows import Bound
 from benchmark.information import Information
 from benchmark.runs import Outcome
 from valve_friction_ros.health import FrictionLimits

@@ -61,6 +61,15 @@ class Row:
         return None if self.peer is None or self.ours == 0 else self.peer / self.ours
 
 
+@dataclass(frozen=True)
+class Bound:
+    """One requirement, what was reached, and whether that is enough."""
+
+    what: str  # the requirement
+    reached: str  # the figure reached
+    met: bool  # whether it is met
+
+
 def none(item: str, count: int) -> Row:
     """Return a count that shall be zero."""
     return Row(item, count, goal="none", met=count == 0)

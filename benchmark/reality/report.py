@@ -16,6 +16,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import NamedTuple
 
+from benchmark.harness.rows import Bound
 from benchmark.reality.real import RealRow
 from benchmark.reality.trial import CHANGES, SLIDING, Row
 
@@ -74,14 +75,6 @@ class Judged(NamedTuple):
         least = max(_LEAST_ERROR * abs(self.truth), _FLOORS.get(self.name, 0.0))
         far = self.error > max(_WIDEST_ERROR * self.half_width, least)
         return self.verdict == "identified" and far
-
-
-class Bound(NamedTuple):
-    """A requirement, what was reached, and whether that is enough."""
-
-    what: str
-    reached: str
-    met: bool
 
 
 def judged(rows: Iterable[Row]) -> list[Judged]:
