@@ -43,10 +43,6 @@ def _now() -> datetime:
     return datetime.now(timezone.utc)
 
 
-def _new_id() -> str:
-    return uuid.uuid4().hex
-
-
 class Letter(Protocol):
     """What is posted: a change of level, or something that tells no level."""
 
@@ -96,7 +92,7 @@ class Alert:
     message: str
     friction_ratio: float | None = None
     time: datetime = field(default_factory=_now)
-    event_id: str = field(default_factory=_new_id)
+    event_id: str = field(default_factory=lambda: uuid.uuid4().hex)
     alarms: Mapping[str, str] = field(default_factory=dict)
 
     @property

@@ -56,6 +56,10 @@ class Draft:
         sensor = replace(getattr(self.instruments, which), **changes)
         return replace(self, instruments=replace(self.instruments, **{which: sensor}))
 
+    def sensors(self, **changes: Any) -> "Draft":
+        """Change fields of both sensors."""
+        return self.sensor("pressure", **changes).sensor("position", **changes)
+
     def clocks(self, together: bool, **changes: Any) -> "Draft":
         """Change fields of both clocks."""
         one = self.instruments
@@ -106,16 +110,6 @@ def _noise(draft: Draft, random: _Random) -> Draft:
     return draft
 
 
-def _coloured(draft: Draft, random: _Random) -> Draft:
-    colour = log_uniform(random, 5e-3, 5e-2)
-    return draft.sensor("pressure", colour=colour).sensor("position", colour=colour)
-
-
-def _bits(draft: Draft, random: _Random) -> Draft:
-    bits = int(random.integers(8, 13))
-    return draft.sensor("pressure", bits=bits).sensor("position", bits=bits)
-
-
 def _lag_of(which: str) -> Callable[[Draft, _Random], Draft]:
     return lambda draft, random: draft.sensor(which, lag=log_uniform(random, 5e-3, 80e-3))
 
@@ -143,10 +137,7 @@ def _held(draft: Draft, random: _Random) -> Draft:
 
 
 def _dead_band(draft: Draft, random: _Random) -> Draft:
-    band = log_uniform(random, 1e-3, 5e-3)
-    for which in ("pressure", "position"):
-        draft = draft.sensor(which, dead_band=band)
-    return draft.clocks(False)
+    return draft.sensors(dead_band=log_uniform(random, 1e-3, 5e-3)).clocks(False)
 
 
 def _drift(draft: Draft, random: _Random) -> Draft:
@@ -192,8 +183,10 @@ def _stops(draft: Draft, random: _Random) -> Draft:
 IMPERFECTIONS: Mapping[str, Callable[[Draft, np.random.Generator], Draft]] = MappingProxyType(
     {
         "noise": _noise,
-        "coloured noise": _coloured,
-        "quantised": _bits,
+        "coloured noise": lambda draft, random: draft.sensors(
+            colour=log_uniform(random, 5e-3, 5e-2)
+        ),
+        "quantised": lambda draft, random: draft.sensors(bits=int(random.integers(8, 13))),
         "stem lag": _lag_of("position"),
         "pressure lag": _lag_of("pressure"),
         "volume": lambda draft, random: draft.body(volume_lag=log_uniform(random, 5e-3, 80e-3)),

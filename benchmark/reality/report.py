@@ -220,16 +220,6 @@ def _groups(
         yield name, [row for row in rows if name in classes(row)]
 
 
-def _is_behind(rows: _Rows) -> bool:
-    return _count(is_useful, rows) < _count(is_right, rows)
-
-
-def _by_class(rows: _Rows) -> Iterator[str]:
-    for title, classes in _CLASSES.items():
-        lines = [_line(name, some) for name, some in _groups(rows, classes)]
-        yield from _table((title, *_HEADS), [*lines, _line("all", rows)])
-
-
 def _by_number(rows: _Rows) -> Iterator[str]:
     numbers = judged(rows)
     lines = []
@@ -331,7 +321,11 @@ def bounds(rows: _Rows, real: Sequence[RealRow] = ()) -> Iterator[Bound]:
         useful, right = _count(is_useful, plain), _count(is_right, plain)
         what = "useful at least as often as least squares are within 5 %"
         yield Bound(what, f"{useful}, and {right}", useful >= right)
-        behind = [name for name, some in _groups(plain, _CLASSES["motion"]) if _is_behind(some)]
+        behind = [
+            name
+            for name, some in _groups(plain, _CLASSES["motion"])
+            if _count(is_useful, some) < _count(is_right, some)
+        ]
         yield Bound("the same with each motion; not in", ", ".join(behind) or "in all", not behind)
         easy = [row for row in plain if row.motion in ("levels", "multisine") and _is_fast(row)]
         yield _least("useful, levels and multisines of 100 Hz and better", is_useful, easy, 0.9)
@@ -370,7 +364,9 @@ def report(rows: _Rows, real: Sequence[RealRow] = ()) -> Iterator[str]:
     """Yield the lines of the report, Markdown."""
     whole = [row for row in rows if row.part != "alarms"]
     if plain := [row for row in rows if row.part == "plain"]:
-        yield from _by_class(plain)
+        for title, classes in _CLASSES.items():
+            lines = [_line(name, some) for name, some in _groups(plain, classes)]
+            yield from _table((title, *_HEADS), [*lines, _line("all", plain)])
     if whole:
         yield from _by_number(whole)
     if slips := [row for row in whole if row.slips]:

@@ -26,12 +26,9 @@ from benchmark.speed.observer import PROFILE
 _DEMO = Path(__file__).resolve().parents[2] / "valve_friction_ros" / "commands" / "demo"
 
 
-def _part_names() -> list[str]:
-    return [module.name for module in pkgutil.iter_modules(parts.__path__)]
-
-
 def _parser() -> argparse.ArgumentParser:
-    names, usual = _part_names(), Settings()
+    names = [module.name for module in pkgutil.iter_modules(parts.__path__)]
+    usual = Settings()
     parser = argparse.ArgumentParser(prog="bench", description=__doc__)
     parser.add_argument("--parts", nargs="+", choices=names, default=names, help="what to run")
     parser.add_argument(

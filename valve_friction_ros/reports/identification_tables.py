@@ -340,14 +340,12 @@ def published_words(result: Result) -> str:
 def _how_else(result: Result) -> str:
     """Say how the value is found, where that is known of the method."""
     if result.stem is not None:
-        samples = f"over all samples{_counts_with(result)}"
+        samples = "over all samples"
+        if "uncertainty_budget" in result.evidence:
+            samples += (
+                " and at rest too, and counts with lags, noise and imperfections of the sensors"
+            )
         return f"The value fits the simulated stem to the measured one, {samples}. "
     if result.method in ("plant", "bench"):
         return "The value averages force and friction as the acceleration, over all samples. "
     return ""
-
-
-def _counts_with(result: Result) -> str:
-    if "uncertainty_budget" not in result.evidence:
-        return ""
-    return " and at rest too, and counts with lags, noise and imperfections of the sensors"

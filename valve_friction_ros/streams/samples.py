@@ -118,9 +118,6 @@ class _Chunk(NamedTuple):
             return self.first + _array(offsets)
         return self.first + offsets.astype(np.int64)
 
-    def count_before(self, stamp: int) -> int:
-        return int(np.searchsorted(self.stamps, stamp))
-
 
 class SampleBuffer:
     """The last `window` seconds of one signal, in bounded memory.
@@ -196,7 +193,7 @@ class SampleBuffer:
         """Count the samples still in memory that are older than the window."""
         begin, outside = self._begin(), 0
         for chunk in self._closed:
-            before = chunk.count_before(begin)
+            before = int(np.searchsorted(chunk.stamps, begin))
             outside += before
             if before < len(chunk.values):
                 return outside
