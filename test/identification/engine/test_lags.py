@@ -124,11 +124,12 @@ class TestProfile:
             assert found[there] == pytest.approx(expected, abs=1e-3)
 
     def test_a_thirtieth_of_the_simulations_are_misled(self):
-        """Beside a narrow likelihood of L, 3 % of the probability is spread over all lags."""
+        """Of the probability 3 % are √10 times as wide: its logarithm is a tenth there."""
         profile = LagProfile.of(parabola())
-        told, alone = np.exp(profile.log_likelihood), np.exp(profile.by_fits)
-        anywhere = (told - alone) / np.sum(told)
-        np.testing.assert_allclose(anywhere, 0.03 / LAGS.size, rtol=1e-6)
+        told, sharp = np.exp(profile.log_likelihood), np.exp(profile.by_fits)
+        blunt = np.exp(-0.5 * (LAGS / SIGMA) ** 2 / (10.0 * SHARPNESS))
+        expected = 0.97 * sharp / np.sum(sharp) + 0.03 * blunt / np.sum(blunt)
+        np.testing.assert_allclose(told / np.sum(told), expected, rtol=1e-6)
         assert profile.spread == pytest.approx(SIGMA * math.sqrt(SHARPNESS), rel=1e-2)
 
     def test_one_near_is_of_the_same_valley(self):

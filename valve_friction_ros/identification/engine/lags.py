@@ -57,9 +57,10 @@ _DEPENDENT = 1.5
 """Factor by which the logarithm of the likelihood of a lag is too sharp: the residuals of one move
 go together. Found on drawn valves."""
 
-_MISLED = 0.03
+_MISLED, _TEMPERED = 0.03, 10.0
 """Share of records in which the simulated stem tells a wrong lag, whatever its residual: presliding
-that it does not know, or a sensor that holds its value. Of drawn valves about so many."""
+that it does not know, or a sensor that holds its value. And the factor by which the logarithm of
+the likelihood is too sharp in these. Of drawn valves about so many, and by no more."""
 
 _NEGLIGIBLE, _HALVINGS = 1e-6, 24
 """Probability of a lag that no interval notices; halvings by which an interval is found."""
@@ -232,8 +233,9 @@ class LagProfile:
     @cached_property
     def log_likelihood(self) -> _Array:
         """Logarithm of the likelihood of each of `LAGS`, by fits that are `_MISLED` at times."""
-        anywhere = _MISLED / (1.0 - _MISLED) * float(np.mean(np.exp(self.by_fits)))
-        return np.asarray(np.logaddexp(self.by_fits, math.log(anywhere)))
+        sharp, blunt = np.exp(self.by_fits), np.exp(self.by_fits / _TEMPERED)
+        misled = _MISLED / (1.0 - _MISLED) * np.sum(sharp) / np.sum(blunt)
+        return np.asarray(np.log(np.maximum(sharp + misled * blunt, np.finfo(float).tiny)))
 
     @property
     def spread(self) -> float:
