@@ -7,10 +7,13 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The pages of the reference hold what the code declares."""
+"""The pages hold what the code declares, draw each room, and have nothing that axe-core faults."""
 
 import ast
 import re
+import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -125,3 +128,99 @@ def test_axe_finds_nothing_wrong_with_a_built_page(name, width):
         page = browser.new_page(viewport={"width": width, "height": 900})
         page.goto((built / f"{name}.html").as_uri())
         assert axe_violations(page) == []
+
+
+SOURCES = PROJECT / "valve_friction_ros"
+PAGE = (PROJECT / "doc" / "rooms.md").read_text(encoding="utf-8")
+DRAWING, REST = PAGE.split("## Each room in one line")
+TABLE, PLACES = REST.split("## Where is …")
+
+
+def rooms(depth):
+    found = SOURCES.glob("/".join(["*"] * depth) + "/__init__.py")
+    return {path.parent.relative_to(SOURCES).as_posix() for path in found}
+
+
+def rooms_of_one_file():
+    """Names that the page gives as a single file, and that are one."""
+    named = [cell.strip("`") for cell in first_cells(TABLE)]
+    return {name for name in named if (SOURCES / name).is_file()}
+
+
+def first_cells(text):
+    return [line.split("|")[1].strip() for line in text.splitlines() if line.startswith("| `")]
+
+
+def test_every_room_has_one_line():
+    named = [cell.strip("`/") for cell in first_cells(TABLE)]
+    assert sorted(named) == sorted(rooms(1) | rooms(2) | rooms_of_one_file())
+
+
+@pytest.mark.parametrize("room", sorted(rooms(1)))
+def test_every_room_is_drawn(room):
+    assert re.search(rf"\b{room}\b", DRAWING)
+
+
+@pytest.mark.parametrize("inner", ["trust", "published", "engine", "signature", "steps"])
+def test_the_rooms_of_identification_are_drawn(inner):
+    assert re.search(rf"\b{inner}\b", DRAWING)
+
+
+def test_every_named_file_is_there():
+    named = re.findall(r"`([a-z_/]+\.py)`", PLACES)
+    assert len(named) > 20
+    missing = [
+        name for name in named if not any((home / name).is_file() for home in (SOURCES, PROJECT))
+    ]
+    assert not missing
+
+
+@pytest.mark.parametrize("equation", range(1, 21))
+def test_every_equation_has_a_place(equation):
+    """(14) stands in a line as itself, or within a range such as (11) to (13)."""
+    cells = [line.split("|")[1] for line in PLACES.splitlines() if line.startswith("| (")]
+    covered = set()
+    for cell in cells:
+        for first, last in re.findall(r"\((\d+)\) to \((\d+)\)", cell):
+            covered |= set(range(int(first), int(last) + 1))
+        covered |= {int(number) for number in re.findall(r"\((\d+)\)", cell)}
+    assert equation in covered
+
+
+EXAMPLES = PROJECT / "examples"
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with chromium() as one:
+        yield one
+
+
+@pytest.fixture(params=[(1400, "light"), (390, "light"), (1400, "dark")], ids=str)
+def report_page(browser, request):
+    width, theme = request.param
+    size = {"width": width, "height": 900}
+    one = browser.new_page(viewport=size, color_scheme=theme, bypass_csp=True)
+    yield one
+    one.close()
+
+
+@pytest.fixture(scope="module")
+def reports(tmp_path_factory):
+    """A folder with two recordings, one of which is refused, and what is written of it."""
+    folder = tmp_path_factory.mktemp("plant")
+    shutil.copy(EXAMPLES / "five_seconds.csv", folder / "FV-101.csv")
+    (folder / "FV-102.csv").write_text("time_s,pressure_pa,position_m\n0,1,1\n1,1,1\n")
+    valve = ["--valve", str(EXAMPLES / "fv_101.yaml")]
+    words = ["identify-folder", folder, *valve, "--output", folder / "plant.html"]
+    command = [sys.executable, "-m", "valve_friction_ros", *words]
+    subprocess.run(command, check=False, timeout=100)
+    return folder
+
+
+def test_pages_of_a_folder_and_of_its_valves(report_page, reports):
+    found = sorted(reports.rglob("*.html"))
+    assert len(found) >= 2
+    for path in found:
+        report_page.goto(path.as_uri())
+        assert axe_violations(report_page) == [], path.name

@@ -76,11 +76,6 @@ class TestReadRecording:
         np.testing.assert_array_equal(found.pressure, loose_record.pressure)
         np.testing.assert_array_equal(found.position, loose_record.position)
 
-    def test_from_a_frame(self, columns, loose_record):
-        pandas = pytest.importorskip("pandas")
-        found = vf.read_recording(pandas.DataFrame(columns))
-        np.testing.assert_array_equal(found.position, loose_record.position)
-
     @pytest.mark.parametrize("zone", [None, "UTC", "Europe/Berlin"])
     def test_from_a_frame_with_an_index_of_dates(self, columns, loose_record, zone):
         pandas = pytest.importorskip("pandas")
@@ -191,12 +186,6 @@ def test_compare_takes_a_result_or_a_number(result):
 
 
 class TestResultsAtWork:
-    def test_a_method_by_its_name(self, loose_record, benches):
-        found = vf.identify(loose_record, benches["low"].valve, "published")
-        assert found.method == "published"
-        with pytest.raises(ValueError, match="there is no method 'refined_'"):
-            vf.identify(loose_record, benches["low"].valve, "refined_")
-
     def test_a_result_is_simulated_as_its_model(self, loose_record, benches, result):
         valve, period = benches["low"].valve, loose_record.sample_period
         by_result = vf.simulate(valve, result, loose_record.pressure, period).position

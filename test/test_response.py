@@ -153,22 +153,6 @@ def answered(dead_time, lag, noise=1e-5, rate=100.0, offset=0.0):
     return monitor
 
 
-@pytest.mark.parametrize(("dead_time", "lag"), [(0.2, 0.3), (1.0, 0.8)])
-def test_the_figures_of_a_lag(dead_time, lag):
-    summary = answered(dead_time, lag).summary
-    assert len(summary.moves) == 6
-    assert all(move.moved and move.settled and move.rested for move in summary.moves)
-    # 0.1 % of the travel is the first movement that counts: of 2 % that is lag·ln(1/0.95).
-    assert dead_time <= summary.dead_time.median <= dead_time + 0.06 * lag + 0.02
-    assert summary.t63.median == pytest.approx(dead_time + lag, abs=0.03)
-    assert summary.t86.median == pytest.approx(dead_time + 2 * lag, abs=0.04)
-    assert summary.overshoot.median == pytest.approx(0.0, abs=0.01)
-    assert summary.steady_deviation.median < 1e-3
-    assert summary.by_size == ((0, 0), (0, 0), (0, 0), (2, 2), (4, 4), (0, 0)) or (
-        sum(count for _, count in summary.by_size) == 6
-    )
-
-
 def test_deviation_in_time():
     monitor = answered(0.2, 0.3, offset=-0.02)
     sizes, signed = monitor.deviation()

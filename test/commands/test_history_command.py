@@ -13,7 +13,6 @@ import argparse
 import csv
 import json
 import math
-import sqlite3
 from dataclasses import replace
 
 import matplotlib.image
@@ -262,19 +261,6 @@ class TestErrors:
         self.refused(run(path=path), str(path), "there is no such file")
         assert not path.exists()
 
-    def test_no_history(self, run, tmp_path):
-        path = tmp_path / "text.sqlite"
-        path.write_text("text" * 1000)
-        self.refused(run(path=path), str(path), "not a database")
-
-    def test_newer(self, run, tmp_path):
-        history = HistoryFile(tmp_path / "newer.sqlite")
-        history.prepare()
-        connection = sqlite3.connect(history.path)
-        connection.execute("PRAGMA user_version = 99")
-        connection.close()
-        self.refused(run(path=history.path), "newer version", "update the package")
-
     def test_empty(self, run, tmp_path):
         history = HistoryFile(tmp_path / "empty.sqlite")
         history.prepare()
@@ -292,9 +278,6 @@ class TestErrors:
 
     def test_no_picture(self, run, tmp_path):
         self.refused(run("--plot", tmp_path / "history.txt"), "not a picture format")
-
-    def test_no_folder_for_the_table(self, run, tmp_path):
-        self.refused(run("--csv", tmp_path / "none" / "history.csv"), "history.csv")
 
     def test_too_many_panels(self, run, tmp_path):
         history = HistoryFile(tmp_path / "many.sqlite")

@@ -7,10 +7,9 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The sub-command `identify` as people and programs use it: options, table, picture, JSON, code."""
+"""The sub-command `identify` as people and programs use it: table, picture, JSON, and refusals."""
 
 import dataclasses
-import gzip
 import json
 import math
 import re
@@ -20,9 +19,9 @@ import sys
 import matplotlib.image
 import numpy as np
 import pytest
-from answers import KEYS, PARAMETER_KEYS, column, known, none_for_nan, row_of, values
+from answers import KEYS, column, known, none_for_nan, row_of, values
 
-from valve_friction_ros.commands.identify import as_json, print_table
+from valve_friction_ros.commands.identify import print_table
 from valve_friction_ros.identification import (
     PARAMETER_UNITS,
     UNITS,
@@ -32,7 +31,7 @@ from valve_friction_ros.identification import (
     identify_bench,
     published_estimate,
 )
-from valve_friction_ros.model import BENCH_VALVE, LOW_FRICTION
+from valve_friction_ros.model import BENCH_VALVE, LOW_FRICTION, Recording, simulate
 
 SETTINGS = IdentificationSettings(assumed_mass=1.6)  # of the valve file
 PNG = b"\x89PNG\r\n\x1a\n"
@@ -61,13 +60,6 @@ class TestTable:
                 said = f"{one.value:.6g} {digits} {unit} {one.verdict.value} {published}"
                 assert row_of(out, name) == f"{name} {said}"
         assert "nan" not in out
-
-    def test_fixed_values_have_no_width(self, call, quick_csv, bench_options):
-        options = ["--fix", "spring_constant=2.05e5", "--fix", "mass"]
-        _, out, _ = call(quick_csv, *bench_options, *options)
-        assert row_of(out, "spring_constant") == "spring_constant 205000 N/m fixed 205000"
-        assert row_of(out, "mass") == "mass 1.6 kg fixed 1.6"
-        assert "fixed: given" not in out
 
     def test_reasons_fit_and_notes(self, call, printed, result, quick_csv, bench_options):
         answer = printed(quick_csv, *bench_options, *BENCH)
@@ -116,12 +108,6 @@ class TestPlot:
         pixels = matplotlib.image.imread(picture)
         assert min(pixels.shape[:2]) > 500
         assert np.unique(pixels.reshape(-1, pixels.shape[2]), axis=0).shape[0] > 10  # colours
-
-    def test_of_a_single_threshold(self, call, quick_csv, bench_options, tmp_path):
-        picture = tmp_path / "record.svg"
-        options = ["--fix", "limit_velocity=0.002", "--plot", picture]
-        assert call(quick_csv, *bench_options, *options)[0] == 0
-        assert "<svg" in picture.read_text()
 
     @pytest.mark.parametrize(
         ("name", "message"),
@@ -222,73 +208,6 @@ class TestJson:
         assert answer["settings"]["derivative_window"] is None
         assert answer["settings"]["assumed_mass"] == 1.6
 
-    def test_the_published_estimate_beside_it(
-        self, printed, quick_csv, quick_record, bench_options
-    ):
-        answer = printed(quick_csv, *bench_options, *BENCH)
-        expected = published_estimate(quick_record, BENCH_VALVE, SETTINGS)
-        assert column(answer, "published") == {**expected.values, "sliding_friction": None}
-        for key in ("threshold", "samples", "sigma", "r_squared"):
-            assert answer["evidence"][key] == getattr(expected, key)
-        assert answer["evidence"]["published_window"] == 31
-
-    def test_a_number_without_a_verdict_is_never_shown(self, printed, quick_csv, bench_options):
-        """What the record does not tell is null throughout, with the reason beside it."""
-        answer = printed(quick_csv, *bench_options, *BENCH)
-        assert {name for name, value in values(answer).items() if value is None} == {
-            "mass",
-            "static_friction",
-        }
-        for entry in answer["parameters"].values():
-            assert set(entry) == PARAMETER_KEYS
-            numbers = [entry["value"], entry["standard_error"], *entry["interval"]]
-            if entry["verdict"] == "not identifiable":
-                assert numbers == [None] * 4
-                assert entry["reason"]
-            else:
-                assert entry["verdict"] in ("identified", "weak", "fixed")
-                low, high = entry["interval"]
-                assert low < entry["value"] < high
-        mass = answer["parameters"]["mass"]
-        assert mass["reason"].endswith("; 1.6 kg assumed")
-        assert mass["published"] == 1.6  # assumed there as well
-
-    def test_without_a_published_estimate(self, result):
-        """The rest of the answer does not depend on it."""
-        parameters = {
-            name: dataclasses.replace(one, published=math.nan)
-            for name, one in result.parameters.items()
-        }
-        alone = dataclasses.replace(result, parameters=parameters, warnings=("no answer",))
-        answer = as_json(alone)
-        assert set(answer) == KEYS
-        assert set(column(answer, "published").values()) == {None}
-        assert values(answer) == values(as_json(result))
-        assert answer["evidence"]["threshold"] == result.estimate.threshold
-        assert answer["warnings"] == ["no answer"]
-
-    def test_gzipped(self, printed, quick_csv, bench_options):
-        packed = quick_csv.with_name("record.csv.gz")
-        packed.write_bytes(gzip.compress(quick_csv.read_bytes()))
-        assert printed(packed, *bench_options) == printed(quick_csv, *bench_options)
-
-    def test_other_headers(self, printed, quick_csv, write_csv, quick_record, bench_options):
-        path = write_csv(
-            {
-                "note": np.full(len(quick_record), math.nan),
-                "p": quick_record.pressure,
-                "x": quick_record.position,
-                "t": np.round(quick_record.time, 9),
-            },
-            "other.csv",
-        )
-        names = ["--time-column", "t", "--position-column", "x", "--pressure-column", "p"]
-        found, plain = (printed(one, *bench_options, *names[: 6 * (one is path)]) for one in
-                        (path, quick_csv))  # fmt: skip
-        told = found["warnings"].pop(0)
-        assert told.endswith("pressure 'p' in Pa, position 'x' in m")
-        assert found == plain
-
 
 ALL = ("mass=1.542", "viscous_friction=4865", "coulomb_friction=152.7", "spring_constant=2.05e5")
 METHOD = ("--method", "bench")
@@ -355,10 +274,6 @@ class TestOptions:
             assert entry["interval"] == [entry["value"]] * 2
             assert entry["published"] == entry["value"]
 
-    def test_threshold(self, printed, quick_csv, bench_options):
-        answer = printed(quick_csv, *bench_options, "--fix", "limit_velocity=0.002")
-        assert answer["evidence"]["threshold"] == 0.002
-
     def test_position_bias(self, printed, quick_csv, bench_options):
         answer = printed(quick_csv, *bench_options, *FOUR_COLUMNS)
         found = column(answer, "published")
@@ -379,18 +294,6 @@ class TestOptions:
         assert known(answer) == {
             name: value for name, value in expected.values.items() if not math.isnan(value)
         }
-
-    def test_valve(self, printed, quick_csv, bench_options, tmp_path):
-        """Twice the area is twice the force, and so is every parameter; 2 rounds nothing."""
-        path = tmp_path / "valve.yaml"
-        path.write_text("diaphragm_area: 0.089\npressure_reference: 41740.0\n")
-        once = printed(quick_csv, *bench_options, *BENCH, "--fix", "mass=1.6")
-        twice = printed(quick_csv, "--valve", path, *BENCH, "--fix", "mass=3.2")
-        doubled = {name: value and 2 * value for name, value in column(once, "published").items()}
-        assert column(twice, "published") == doubled
-        assert known(twice) == pytest.approx(
-            {name: 2 * value for name, value in known(once).items()}, rel=1e-6
-        )
 
     def test_what_the_valve_file_states_is_compared(self, call, printed, quick_csv, tmp_path):
         """Twice the area of the bench valve, with the spring of its data sheet."""
@@ -423,24 +326,91 @@ class TestOptions:
         assert column(found, "published") == column(expected, "published")
         assert column(found, "verdict") == column(expected, "verdict")
         assert known(found) == pytest.approx(known(expected), rel=1e-6)
-        for answer in (found, expected):
-            del answer["settings"]["assumed_mass"]  # of the valve file
-        # How a table of other headers was read is noted.
-        assert [one.partition(":")[0] for one in found.pop("warnings")] in ([], ["read as"])
-        del expected["warnings"]
         assert found["sliding_speed"] == pytest.approx(expected["sliding_speed"], rel=1e-9)
-        close = ("parameters", "evidence", "fit", "rms", "systematic_misfit", "sliding_speed")
-        first_survey = ("diagnosis", "findings")  # by the travel, which the valve file tells
-        assert [expected.pop(one, None) is not None for one in first_survey] == [True, True]
-        assert {key: found[key] for key in found if key not in close} == {
-            key: expected[key] for key in expected if key not in close
-        }
+        # The first survey is by the travel, which the valve file tells.
+        assert [one in found for one in ("diagnosis", "findings")] == [False, False]
+        # How a table of other headers was read is noted.
+        assert [one.partition(":")[0] for one in found["warnings"]] in ([], ["read as"])
 
-    def test_help_names_all(self, call, capsys):
-        with pytest.raises(SystemExit) as ended:
-            call("--help")
-        assert ended.value.code == 0
-        options = set(re.findall(r"--[a-z-]+", capsys.readouterr().out))
-        columns = {f"--{name}-column" for name in ("time", "position", "pressure", "force")}
-        method = {"--method", "--fix", "--position-bias", "--derivative-window", "--order"}
-        assert options >= columns | method | {"--valve", "--plot", "--report", "--json"}
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda c: c.update({k: v[:309] for k, v in c.items()}), "the record is too short: 309 s"),
+        (lambda c: c["position_m"].fill(0.01), "the stem did not move: its position spans 0 µm"),
+        (lambda c: c["position_m"].put(range(50, 150), math.nan), "row 52, column 'position_m': "),
+        (lambda c: c["time_s"].put(50, 0.48), "row 52, column 'time_s' goes back (0.48 s after 0"),
+        (lambda c: c["pressure_pa"].put(50, 250000.5), "row 52, column 'pressure_pa': 250000 Pa "),
+        (lambda c: c.pop("time_s"), "cannot tell which column is the time, of position_m, "),
+        (lambda c: c.update(position_m=1e3 * c["position_m"]), "the stem position runs from 3.691"),
+        (lambda c: c.update(position_m=0.028 - c["position_m"]), "the stem moves against the pres"),
+        (lambda c: c.update(pressure_pa=np.roll(c["pressure_pa"], 250)), "no friction model repro"),
+    ],
+    ids=["short", "still", "nan", "back", "range", "no time", "mm", "inverted", "no model"],
+)
+@pytest.mark.parametrize("how", [[], ["--json"]], ids=["table", "json"])
+def test_records(refusal, write_csv, columns_of, quick_record, bench_options, change, message, how):
+    columns = {name: np.array(column) for name, column in columns_of(quick_record).items()}
+    change(columns)
+    path = write_csv(columns)
+    picture = path.with_suffix(".png")
+    told = refusal(path, *bench_options, *how, "--plot", picture)
+    assert told.startswith(f"{path}: {message}")
+    assert not picture.exists()
+
+
+def test_sampled_too_slowly(refusal, write_csv, columns_of, benches, bench_options):
+    """Ten samples a second of a stem that crosses its range within one of them."""
+    pressure = np.where(np.arange(400) // 20 % 2, 160e3, 64e3)
+    position = simulate(*benches["low"], pressure, 0.1).position
+    path = write_csv(columns_of(Recording(0.1, pressure, position)))
+    message = refusal(path, *bench_options)
+    assert message.startswith(f"{path}: sampling is too slow for the motion: the stem moves ")
+
+
+def test_no_file(refusal, tmp_path, bench_options):
+    path = tmp_path / "none.csv"
+    expected = f"{path}: cannot be read as CSV: No such file or directory"
+    assert refusal(path, *bench_options) == expected
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("travel: 0.03", "diaphragm_area is missing"),
+        ("diaphragm_area: 1.0\nmas: 1.0", "unknown key 'mas'; did you mean 'mass'?"),
+    ],
+)
+def test_valve_file(refusal, quick_csv, tmp_path, text, message):
+    path = tmp_path / "valve.yaml"
+    path.write_text(text)
+    assert refusal(quick_csv, "--valve", path).startswith(f"{path}: {message}")
+
+
+def test_no_valve_file_for_a_pressure(refusal, quick_csv):
+    assert refusal(quick_csv).startswith(
+        "pressure needs the diaphragm_area: give a valve file by --valve; "
+    )
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ("--fix mass=heavy", "--fix mass=heavy: 'heavy' is not a number"),
+        ("--fix spring_constant", "--fix spring_constant: give a value, as spring_constant="),
+        ("--fix weight=1", "'weight' is not a parameter that can be fixed; choose from mass"),
+        ("--fix coulomb_fricton=400", "'coulomb_fricton' is not a parameter that can be fixed; d"),
+        ("--fix mass=1 --fix mass=2", "--fix mass is given twice"),
+        ("--fix mass --fix mass", "--fix mass is given twice"),
+        ("--fix mass=nan", "mass must be finite, got nan"),
+        ("--fix static_friction=150", "FILE: the method plant finds F_s itself"),
+        ("--derivative-window 30", "derivative_window must be odd and at least order + 2 = 5"),
+        ("--derivative-window 101", "FILE: the record is too short: 1000 samples"),
+        ("--position-bias nan", "position_bias must be finite, got nan"),
+        ("--timing-uncertainty=-0.01", "timing_uncertainty must"),
+        ("--area-uncertainty=nan", "area_uncertainty must"),
+    ],
+)
+def test_options(refusal, quick_csv, bench_options, options, message):
+    told = refusal(quick_csv, *bench_options, *options.split())
+    assert told.startswith(message.replace("FILE", str(quick_csv)))

@@ -7,10 +7,10 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The sub-command `identify` on plants, real machines, packings that slip, and whole valves."""
+"""The sub-command `identify` on plants, machines, packings that slip, and a first survey."""
 
+import csv
 import dataclasses
-import gzip
 import json
 import math
 import re
@@ -19,7 +19,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from answers import KEYS, PARAMETER_KEYS, column, none_for_nan, row_of, values
+from answers import KEYS, PARAMETER_KEYS, none_for_nan, row_of, values
 from pages import PageReader
 
 from valve_friction_ros.identification import (
@@ -28,13 +28,11 @@ from valve_friction_ros.identification import (
     IdentificationSettings,
     identify_plant,
     identify_signature,
-    published_estimate,
 )
 from valve_friction_ros.model import (
     BENCH_VALVE,
     GRAPHITE_PACKING,
     GRAPHITE_VALVE,
-    LOW_FRICTION,
     Recording,
     SensorNoise,
     SineWave,
@@ -61,32 +59,9 @@ def test_the_result_of_the_library(printed, path, noisy, bench_options):
     assert set(answer) == KEYS | {"diagnosis", "findings"}
     assert answer["method"] == expected.method == "plant"
     assert [*answer["parameters"]] == [*UNITS, "sliding_friction"]
-    for name, entry in answer["parameters"].items():
-        one = expected.parameters[name]
-        assert (entry["verdict"], entry["reason"]) == (one.verdict.value, one.reason)
-        assert entry["value"] == pytest.approx(none_for_nan(one.value), rel=1e-9)
-        assert entry["half_width"] == pytest.approx(none_for_nan(one.half_width), rel=1e-9)
     assert answer["derivative_window"] == 0
     assert answer == printed(path, *bench_options, "--method", "plant")
     assert answer == printed(path, *bench_options, "--method", "best")
-
-
-def test_the_published_estimate_beside_it(printed, call, path, noisy, bench_options):
-    answer = printed(path, *bench_options)
-    expected = published_estimate(noisy, BENCH_VALVE, SETTINGS)
-    published = column(answer, "published")
-    assert published.pop("sliding_friction") is None
-    assert published == pytest.approx(expected.values, rel=1e-9)
-    assert answer["evidence"]["threshold"] == pytest.approx(expected.threshold, rel=1e-9)
-    out = call(path, *bench_options)[1]
-    assert row_of(out, "coulomb_friction").endswith(f" {expected.values['coulomb_friction']:.6g}")
-
-
-def test_a_known_static_friction_is_refused(refusal, path, bench_options):
-    assert refusal(path, *bench_options, "--fix", "static_friction=150") == (
-        f"{path}: the method plant finds F_s itself and takes no known one: leave it out, or use "
-        "the method published"
-    )
 
 
 class TestGap:
@@ -98,38 +73,11 @@ class TestGap:
         columns = {name: column[kept] for name, column in columns_of(noisy).items()}
         return write_csv(columns, "broken.csv")
 
-    def test_it_costs_the_stretch_around_it(self, printed, broken, bench_options):
-        answer = printed(broken, *bench_options)
-        assert answer["method"] == "plant"
-        for name in ("coulomb_friction", "spring_constant"):
-            low, high = answer["parameters"][name]["interval"]
-            assert low < getattr(LOW_FRICTION, name) < high, name
-        friction = answer["parameters"]["coulomb_friction"]
-        assert friction["half_width"] < 0.25 * friction["value"]  # the first alarm
-        left_out = [note for note in answer["warnings"] if note.endswith(" left out")]
-        assert len(left_out) == 2
-        assert {entry["published"] for entry in answer["parameters"].values()} == {None}
-
     @pytest.mark.parametrize("method", ["published", "signature"])
     def test_the_others_refuse_it(self, refusal, broken, bench_options, method):
         assert refusal(broken, *bench_options, "--method", method).startswith(
             f"{broken}: row 402, column 'time_s': gap of 0.51 s: use a stretch of the record"
         )
-
-    def test_no_model_is_validated_through_it(
-        self, command, call, broken, path, bench_options, tmp_path
-    ):
-        estimate = tmp_path / "estimate.json"
-        bench = [*bench_options, "--timing-uncertainty", "0"]
-        estimate.write_text(call(path, *bench, "--json")[1])
-        code, out, err = command("validate", broken, *bench_options, "--estimate", estimate)
-        assert (code, out) == (2, "")
-        assert "gap of 0.51 s" in err
-
-
-def timing(answer):
-    """The share of the lag in the standard uncertainty of each parameter."""
-    return {name: one["timing"] for name, one in answer["evidence"]["uncertainty_budget"].items()}
 
 
 class TestTimingUncertainty:
@@ -137,24 +85,6 @@ class TestTimingUncertainty:
         found = printed(path, *bench_options, "--timing-uncertainty", "0.005")
         assert found["settings"]["timing_uncertainty"] == 0.005
         assert printed(path, *bench_options)["settings"]["timing_uncertainty"] is None
-
-    def test_signals_that_surely_belong_together_have_no_share(self, printed, path, bench_options):
-        """And leave the work of friction less uncertain; all values are finite still."""
-        sure = printed(path, *bench_options, "--timing-uncertainty", "0")
-        unsure = printed(path, *bench_options, "--timing-uncertainty", "0.08")
-        assert set(timing(sure).values()) == {0.0}
-        for name in ("viscous_friction", "sliding_friction"):
-            assert timing(unsure)[name] > 0, name
-        widths = [one["parameters"]["sliding_friction"]["half_width"] for one in (sure, unsure)]
-        assert 0 < widths[0] < widths[1]
-        known = [value for value in values(sure).values() if value is not None]
-        assert all(map(math.isfinite, known))
-
-    @pytest.mark.parametrize("text", ["-0.01", "nan", "inf"])
-    def test_impossible(self, refusal, path, bench_options, text):
-        assert refusal(path, *bench_options, f"--timing-uncertainty={text}").startswith(
-            "timing_uncertainty must"
-        )
 
 
 class TestCalibration:
@@ -172,57 +102,6 @@ class TestCalibration:
         assert spring["half_width"] == pytest.approx(math.hypot(known["half_width"], 2 * error))
         budget = found["evidence"]["uncertainty_budget"]["spring_constant"]
         assert budget["calibration"] == pytest.approx(error)
-
-    @pytest.mark.parametrize("text", ["-0.01", "nan", "2"])
-    def test_impossible(self, refusal, path, bench_options, text):
-        assert refusal(path, *bench_options, f"--area-uncertainty={text}").startswith(
-            "area_uncertainty must"
-        )
-
-
-EMPS = Path(__file__).resolve().parents[3] / "shared" / "data" / "emps" / "emps_identification.csv"
-PUBLISHED = {  # IDIM-LS
-    "mass": 95.1089,
-    "viscous_friction": 203.5034,
-    "coulomb_friction": 20.3935,
-    "spring_preload": -3.1648,
-}
-PNG = b"\x89PNG\r\n\x1a\n"
-
-
-@pytest.mark.skipif(
-    not EMPS.is_file(), reason="the benchmark record is not the project's to distribute"
-)
-class TestRealMachine:
-    @pytest.fixture
-    def recorded(self, tmp_path):
-        """The published record under the headers that the command expects, gzipped."""
-        rows = EMPS.read_text().splitlines()[1:]
-        path = tmp_path / "emps.csv.gz"
-        with gzip.open(path, "wt") as stream:
-            stream.write("\n".join(["time_s,force_n,position_m", *rows]) + "\n")
-        return path
-
-    def test_published_values(self, printed, recorded):
-        answer = printed(recorded, "--fix", "spring_constant=0")
-        for name, value in PUBLISHED.items():
-            entry = answer["parameters"][name]
-            assert entry["published"] == pytest.approx(value, rel=0.05), name
-            low, high = entry["interval"]
-            assert entry["value"] == pytest.approx(value, rel=0.02) or low < value < high, name
-            assert entry["verdict"] in ("identified", "weak")
-        assert values(answer)["spring_constant"] == 0.0
-        assert {answer[key] for key in ("rms", "systematic_misfit")} == {None}
-        assert answer["model_describes"] is True
-        assert 0.9 < answer["fit"] < 1.0
-        assert answer["parameters"]["spring_constant"]["verdict"] == "fixed"
-        assert answer["evidence"]["published_window"] == 31
-
-    def test_by_its_own_headers(self, printed, recorded):
-        names = EMPS.read_text().split("\n", 1)[0].split(",")
-        options = ["--time-column", names[0], "--force-column", names[1]]
-        options += ["--position-column", names[2], "--fix", "spring_constant=0"]
-        assert printed(EMPS, *options) == printed(recorded, "--fix", "spring_constant=0")
 
 
 class TestSignature:
@@ -256,27 +135,6 @@ class TestSignature:
         assert [way for way, _ in points] == [1, -1, 1, -1, 1]
         assert {entry["published"] for entry in answer["parameters"].values()} == {None}
         assert answer["fit"] == pytest.approx(expected.fit, rel=1e-6)
-
-    def test_table_and_picture(self, call, path, bench_options, tmp_path):
-        picture = tmp_path / "signature.png"
-        code, out, err = call(path, *bench_options, "--method", "signature", "--plot", picture)
-        assert (code, err) == (0, "")
-        words = " ".join(out.split())
-        assert "the model's stem is" in words
-        assert "signature: 3 strokes up and 2 down, bias x̄ 1.1" in words
-        assert picture.read_bytes().startswith(PNG)
-
-    def test_a_square_wave_is_refused(
-        self, call, write_csv, columns_of, square_record, bench_options
-    ):
-        path = write_csv(columns_of(square_record))
-        code, out, err = call(path, *bench_options, "--method", "signature")
-        assert (code, out) == (2, "")
-        assert err.startswith(
-            f"valve_friction identify: {path}: the stem does not slide at a constant"
-        )
-        assert "slow triangular wave" in err
-        assert err.count("\n") == 1
 
 
 SLIPPING = dataclasses.replace(GRAPHITE_PACKING, mass=1.6)
@@ -321,11 +179,6 @@ class TestSlipJumps:
         assert answer["model_describes"] is True
         assert answer["systematic_misfit"] < 10e-6
 
-    def test_a_slip_jump_tells_the_static_friction(self, printed, file_of, options):
-        answer = printed(file_of(SLIPPING), *options)
-        self.assert_true(answer, SLIPPING)
-        assert list(answer["parameters"]) == [*UNITS, "sliding_friction"]
-
     def test_a_fall_of_the_friction_is_told_with_its_speed(self, printed, file_of, options):
         answer = printed(file_of(FALLING), *options)
         self.assert_true(answer, FALLING)
@@ -344,26 +197,6 @@ class TestSlipJumps:
         assert re.fullmatch(
             r"stribeck_velocity 0\.00(29|3[0-6])\d+ \S+ m/s (identified|weak)", row
         ), row
-
-    def test_late_stamps_are_reported(self, printed, file_of, options):
-        """Ten samples, 100 ms, by the default; a bench has no lags."""
-        path = file_of(SLIPPING, delay=10)
-        lag = printed(path, *options[:-2])["evidence"]["imperfections"]["lag"]
-        assert abs(lag["value"] - 0.1) < lag["half_width"] < 0.02
-        assert printed(path, *options)["model_describes"] is False
-
-    @pytest.mark.parametrize("packing", [SLIPPING, FALLING], ids=["slips", "falls"])
-    def test_with_a_lag_in_the_intervals(self, printed, file_of, options, packing):
-        """The default finds the same packing, and its wider intervals hold the truth."""
-        parameters = printed(file_of(packing), *options[:-2])["parameters"]
-        for name in self.NAMES:
-            low, high = parameters[name]["interval"]
-            assert low < getattr(packing, name) < high, name
-        friction = parameters["coulomb_friction"]
-        assert friction["half_width"] < 0.05 * friction["value"]
-        if packing.stribeck_velocity > 0:
-            low, high = parameters["stribeck_velocity"]["interval"]
-            assert low < packing.stribeck_velocity < high
 
 
 @pytest.fixture
@@ -443,3 +276,53 @@ def test_a_friction_that_is_given_says_nothing_of_the_spring(call, weak_csv, ben
     code, out, _ = call(weak_csv, *bench_options, *options)
     assert code == 0
     assert json.loads(out)["findings"] == []
+
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+RECORDING = EXAMPLES / "five_seconds.csv"
+CASES = [
+    ([], "good"),
+    (["--packing", "ptfe"], "watch"),
+    (["--survey-watch", "0.12"], "watch"),
+    (["--survey-watch", "0.02", "--survey-bad", "0.05"], "bad"),
+]
+
+
+@pytest.fixture
+def graphite_file(tmp_path):
+    text = (EXAMPLES / "fv_101.yaml").read_text()
+    place = "    travel: 0.028575"
+    assert place in text
+    path = tmp_path / "graphite.yaml"
+    path.write_text(text.replace(place, f"    packing: graphite\n{place}"))
+    return path
+
+
+@pytest.mark.parametrize(("given", "survey"), CASES)
+def test_of_a_recording(printed, graphite_file, given, survey):
+    shown = printed(RECORDING, "--valve", graphite_file, "--method", "bench", *given)
+    assert shown["diagnosis"]["survey"] == survey
+
+
+def test_it_is_said_at_the_end_of_the_table(call, graphite_file):
+    code, out, _ = call(RECORDING, "--valve", graphite_file, "--method", "bench")
+    assert code == 0
+    assert "no baseline yet" in out.splitlines()[-1]
+    assert out.rstrip().endswith("good, by the limits of the first survey")
+
+
+@pytest.mark.parametrize(("given", "survey"), CASES[:2])
+def test_of_a_folder(command, graphite_file, given, survey, tmp_path):
+    folder = tmp_path / "recordings"
+    folder.mkdir()
+    (folder / RECORDING.name).write_bytes(RECORDING.read_bytes())
+    table = tmp_path / "results.csv"
+    words = folder, "--valve", graphite_file, "--method", "bench", "--output", table
+    assert command("identify-folder", *words, *given)[0] == 0
+    with table.open(newline="") as lines:
+        assert [row["survey"] for row in csv.DictReader(lines)] == [survey]
+
+
+def test_limits_out_of_order_are_refused(refusal, graphite_file):
+    words = "0 < survey_watch < survey_bad, got survey_watch 0.5, survey_bad 0.3"
+    assert words in refusal(RECORDING, "--valve", graphite_file, "--survey-watch", "0.5")

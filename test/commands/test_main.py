@@ -7,9 +7,11 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The command `valve_friction`: how it finds its sub-commands, and how it ends."""
+"""The command `valve_friction`: how it finds its sub-commands, their options, and how it ends."""
 
+import argparse
 import importlib
+import io
 import os
 import re
 import resource
@@ -21,7 +23,9 @@ from pathlib import Path
 import pytest
 
 from valve_friction_ros import __version__
+from valve_friction_ros.commands.arguments import add_options, percent
 from valve_friction_ros.commands.main import SUB_COMMANDS, run
+from valve_friction_ros.dashboard.accounts import Account, Role
 
 EXTRA = Path(__file__).with_name("extra_sub_command.py")
 SLOW = {
@@ -56,19 +60,6 @@ class TestChoice:
         lines = [" ".join(line.split()) for line in out.splitlines()]
         for name, text in SUB_COMMANDS.items():
             assert f"{name} {text}" in lines
-
-    def test_help_imports_no_sub_command(self):
-        """It is there at once: nothing slow is imported for it."""
-        code = (
-            "import sys\n"
-            "from valve_friction_ros.commands.main import run\n"
-            "try: run(['--help'])\n"
-            "except SystemExit: print('\\n'.join(sys.modules), file=sys.stderr)"
-        )
-        loaded = ended(start("-c", code, program=[]))[2].split()
-        assert "valve_friction_ros.commands.main" in loaded
-        assert not SLOW & set(loaded)
-        assert not [name for name in loaded if name.startswith("valve_friction_ros.commands.i")]
 
     def test_help_of_a_sub_command_imports_nothing_slow(self):
         """It is there at once, too: the declarations of all take only what is light."""
@@ -295,3 +286,85 @@ def test_a_misspelled_service_gets_the_nearest_name(capsys):
         run(["call", "fv_101", "idnetify"])
     assert end.value.code == 2
     assert "unknown service 'idnetify'; did you mean 'identify'?" in capsys.readouterr().err
+
+
+TEXT = """
+    --plot FILE.png: draw it, --on a grid
+        of 5 %%
+    --folder DIR: where
+    --json: print it
+    --name NAME: of it (%(default)s)
+    --jobs N: how many
+    """
+
+
+@pytest.fixture
+def parser():
+    parser = argparse.ArgumentParser()
+    add_options(parser, TEXT, name={"default": "all"}, jobs={"type": int, "required": True})
+    return parser
+
+
+def test_paths_texts_flags_and_what_is_said_beside(parser):
+    given = ["--plot", "a.png", "--folder", "b", "--json", "--jobs", "2"]
+    wanted = argparse.Namespace(plot=Path("a.png"), folder=Path("b"), json=True, name="all", jobs=2)
+    assert parser.parse_args(given) == wanted
+    left_out = argparse.Namespace(plot=None, folder=None, json=False, name="all", jobs=2)
+    assert parser.parse_args(["--jobs", "2"]) == left_out
+
+
+def test_the_help_is_the_text(parser):
+    shown = " ".join(parser.format_help().split())
+    for words in ("--plot FILE.png draw it, --on a grid of 5 %", "--name NAME of it (all)"):
+        assert words in shown
+
+
+@pytest.mark.parametrize(("text", "share"), [("90", 0.9), ("2.5 %", 0.025), ("-10", -0.1)])
+def test_percent(text, share):
+    assert percent(text) == pytest.approx(share)
+
+
+@pytest.mark.parametrize("text", ["101", "many", "nan", ""])
+def test_no_percent(text):
+    with pytest.raises(argparse.ArgumentTypeError, match="is not a percentage, such as 90"):
+        percent(text)
+
+
+PASSWORD = "correct horse battery"
+
+
+def typed(monkeypatch, text):
+    monkeypatch.setattr(sys, "stdin", io.StringIO(text))
+
+
+def test_a_piped_password(monkeypatch, capsys):
+    typed(monkeypatch, f"{PASSWORD}\n")
+    assert run(["dashboard-account", "anna", "--role", "operate"]) == 0
+    printed = capsys.readouterr()
+    account = Account.read(printed.out)
+    assert (account.name, account.role) == ("anna", Role.OPERATE)
+    assert account.password.matches(PASSWORD)
+    assert PASSWORD not in printed.out + printed.err
+
+
+@pytest.mark.parametrize(
+    ("name", "password", "words"),
+    [("anna", "short", "10 to 200 characters"), ("an na", PASSWORD, "the name of an account")],
+)
+def test_what_is_refused(monkeypatch, capsys, name, password, words):
+    typed(monkeypatch, f"{password}\n")
+    assert run(["dashboard-account", name]) == 2
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert words in printed.err
+
+
+def test_a_terminal_is_asked_twice(monkeypatch, capsys):
+    monkeypatch.setattr(sys.stdin, "isatty", lambda: True, raising=False)
+    for second, code in ((PASSWORD, 0), ("another password", 2)):
+        answers = iter([PASSWORD, second])
+        monkeypatch.setattr("getpass.getpass", lambda _, answers=answers: next(answers))
+        assert run(["dashboard-account", "bo"]) == code
+    printed = capsys.readouterr()
+    assert Account.read(printed.out).role is Role.VIEW
+    assert "the two passwords differ" in printed.err

@@ -7,8 +7,9 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Huge, nested and hostile files: one line, and memory that stays small."""
+"""Huge, nested and hostile files and names: one line, and memory that stays small."""
 
+import csv
 import gzip
 import json
 import resource
@@ -17,6 +18,11 @@ import sys
 from functools import partial
 
 import pytest
+from histories import START, VALVE, success
+
+from valve_friction_ros.commands.main import run
+from valve_friction_ros.history import HistoryFile, KeptValve
+from valve_friction_ros.outside_text import harmless, printable
 
 HEADER = b"time_s,position_m,pressure_pa\n"
 MEMORY = 1_500_000_000
@@ -139,8 +145,6 @@ class TestValveFiles:
             ("diaphragm_area: 1.0\ncolumns: {skip_rows: 1.5}", "must be a whole number"),
             ("diaphragm_area: 1.0\ncolumns: {encoding: klingon}", "unknown encoding 'klingon'"),
             ("diaphragm_area: 1.0\nmethod: guess", "method 'guess' is unknown"),
-            ("diaphragm_aera: 1.0", "unknown key 'diaphragm_aera'; did you mean 'diaphragm_area'?"),
-            ("diaphragm_area: 445", "cm² or in² read as m²?"),
             ("diaphragm_area: 0.04\ntravel: 28.6", "mm read as m?"),
         ],
     )
@@ -174,3 +178,39 @@ class TestEstimates:
         assert err.count("\n") == 1
         assert cause in err
         assert len(err) < 500
+
+
+TAG = "=1+1 cost $\\foo{$ \x1b[2J\x07"
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("FV-101 µm ²", "FV-101 µm ²"),
+        ("\x1b[31mred\x07\n", "\\x1b[31mred\\x07\\n"),
+        ("\x9b2J\u202etxt\udcff", "\\x9b2J\\u202etxt\\udcff"),
+        ("x" * 20_000, "x" * 10_000 + "…"),
+    ],
+)
+def test_printable(text, shown):
+    assert printable(text) == shown
+
+
+@pytest.mark.parametrize("text", ["=1+1", "+1", "-1", "@x", "\t=1", "\r=1"])
+def test_a_formula_is_a_text(text):
+    assert harmless(text) == f"'{text}"
+    assert (harmless("FV-101"), harmless(-1.0), harmless(None)) == ("FV-101", -1.0, None)
+
+
+def test_a_hostile_tag_in_table_csv_and_picture(tmp_path, capsys):
+    file = tmp_path / "plant.sqlite"
+    HistoryFile(file).add(success(START, valve=KeptValve(VALVE.name, TAG)))
+    table, picture = tmp_path / "a.csv", tmp_path / "a.png"
+    assert run(["history", str(file), "--csv", str(table), "--plot", str(picture)]) == 0
+    out, err = capsys.readouterr()
+    assert err == ""
+    assert "=1+1 cost $\\foo{$ \\x1b[2J\\x07" in out
+    with table.open(newline="") as stream:
+        (row,) = csv.DictReader(stream)
+    assert row["tag"] == f"'{TAG}"
+    assert picture.stat().st_size > 5000

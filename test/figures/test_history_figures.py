@@ -231,20 +231,6 @@ def test_one_panel_a_valve_and_one_legend(history):
     assert len(labels) == len(set(labels))
 
 
-@pytest.mark.parametrize("count", [0, 13])
-def test_none_or_too_many(history, count):
-    with pytest.raises(ValueError, match=f"one to 12 valves can be drawn, got {count}"):
-        trend_figure([history] * count)
-
-
-def test_the_legend_is_above_the_panels(history):
-    figure = trend_figure([history])
-    figure.draw_without_rendering()
-    (legend,), (axes,) = figure.legends, figure.axes
-    assert legend.get_window_extent().y1 <= figure.bbox.y1
-    assert legend.get_window_extent().y0 >= axes.get_tightbbox().y1
-
-
 TIMES = (1, 3, *[0] * (BINS - 3), 4)
 
 

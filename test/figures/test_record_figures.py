@@ -23,7 +23,7 @@ from valve_friction_ros.figures import (
     require_picture_file,
     validation_figure,
 )
-from valve_friction_ros.figures.panels import COLOURS, titled_figure
+from valve_friction_ros.figures.panels import COLOURS
 from valve_friction_ros.figures.record_figures import (
     comparison_figure,
     evidence_figure,
@@ -53,10 +53,8 @@ from valve_friction_ros.model import (
     Recording,
     SensorNoise,
     TriangleWave,
-    Valve,
     simulate,
 )
-from valve_friction_ros.wording import with_width
 
 NAN = math.nan
 LABELS = {"pressure", "stem", "coulomb", "sigma", "signature"}
@@ -156,14 +154,6 @@ class TestPanels:
         (note,) = panels(identification_figure(found))["coulomb"].texts
         assert note.get_text() == "$F_c$ = 152.5 N: fixed"
 
-    @pytest.mark.parametrize("coulomb", [40.0, 152.0, 1520.0])
-    def test_both_frictions_are_in_sight(self, with_parameters, coulomb):
-        found = with_parameters(coulomb_friction=(coulomb, 1.0, Verdict.IDENTIFIED))
-        axes = panels(identification_figure(found))["coulomb"]
-        low, high = axes.get_ylim()
-        assert low < coulomb < high
-        assert low < found.estimate.coulomb_friction < high
-
     def test_force_of_a_machine_without_diaphragm(self, record, result):
         force = dataclasses.replace(record, driven_by=Drive.FORCE)
         found = panels(identification_figure(dataclasses.replace(result, recording=force)))
@@ -244,18 +234,6 @@ class TestVerdict:
         assert len(told) == 5
         assert told[-1] == "and 2 more notes, which the command prints"
 
-    def test_one_warning_more_than_fits_is_told(self, known):
-        """A line that counts it would need as much room."""
-        told = identification_figure(dataclasses.replace(known, warnings=(*"abcd",)))
-        assert told._supxlabel.get_text().splitlines() == [f"note: {one}" for one in "abcd"]
-
-    def test_a_number_keeps_its_percent_sign(self):
-        """Wherever the line of a title breaks."""
-        for length in range(85, 100):
-            title = f"{'x' * length} 14 % of travel"
-            lines = titled_figure(title)._suptitle.get_text().splitlines()
-            assert not any(line.startswith("%") for line in lines)
-
     def test_the_friction_stands_clear_of_the_sweep(self, known):
         """No point of the curve lies below the words that name F_c."""
         figure = identification_figure(known)
@@ -267,37 +245,6 @@ class TestVerdict:
         covered = [box.contains(x, y) for x, y in curve]
         assert len(covered) > 100
         assert not any(covered)
-
-    def test_the_scale_of_sigma_can_be_read(self, known):
-        figure = identification_figure(known)
-        figure.draw_without_rendering()
-        axes = panels(figure)["sigma"]
-        low, high = axes.get_ylim()
-        ticks = [tick for tick in axes.get_yticks() if low <= tick <= high]
-        assert len(ticks) >= 3
-        assert all(label.get_text() for label in axes.get_yticklabels())
-
-    def test_the_model_is_seen_on_the_measured_stem(self, known):
-        """Also in black and white: a thin dark line on a wide pale one."""
-        measured, model = panels(identification_figure(known))["stem"].lines
-        assert measured.get_linewidth() > 2 * model.get_linewidth()
-        assert measured.get_alpha() < 0.5
-        assert model.get_color() == "k"
-
-    def test_beyond_the_travel(self, with_parameters):
-        tight = with_parameters(
-            coulomb_friction=(4e3, 1.0, Verdict.IDENTIFIED),
-            static_friction=(4e3, 1.0, Verdict.IDENTIFIED),
-            spring_constant=(2.05e5, 0.0, Verdict.FIXED),
-        )
-        title = title_of(identification_figure(tight))
-        assert "dead band 137 % of travel" in title
-
-    def test_without_a_travel(self, result):
-        endless = Valve(BENCH_VALVE.diaphragm_area, BENCH_VALVE.pressure_reference)
-        assert "dead band" not in title_of(
-            identification_figure(dataclasses.replace(result, valve=endless))
-        )
 
 
 class TestSeveralCases:
@@ -323,24 +270,11 @@ class TestSeveralCases:
         ends = [line.get_xdata()[-1] for line in lines[2:]]
         assert ends == pytest.approx([30.0 + record.duration] * 2, abs=record.sample_period)
 
-    def test_one_alone_needs_no_legend(self, figure):
-        assert panels(figure)["signature"].get_legend() is None
-
     @pytest.mark.parametrize("count", [0, 1 + len(COLOURS)])
     def test_none_or_too_many(self, record, result, count):
         cases = [self.case(record, result, number) for number in range(count)]
         with pytest.raises(ValueError, match=f"^one to 4 cases can be drawn, got {count}$"):
             friction_figure(cases, "verdict")
-
-
-def test_case_of_a_result(result):
-    case = Case.of("loose", result)
-    coulomb, sigma, _ = case.drawing.panels
-    assert coulomb.curves[1].y == [result.estimate.coulomb_friction]
-    assert sigma.chosen == result.estimate.threshold
-    assert coulomb.level is result.parameters["coulomb_friction"]
-    assert case.stem is result.stem
-    assert case.recording.driven_by is Drive.PRESSURE
 
 
 class TestPictures:
@@ -452,9 +386,6 @@ class TestLaw:
         np.testing.assert_allclose(np.abs(law.y), 50.0 + 4e3 * np.abs(speed))
         assert np.isfinite(law.half_width).all()
 
-    def test_no_line_without_a_law(self):
-        assert [one.style for one in drawn(sliding_friction=(70.0, 2.0))] == ["o", "D"]
-
     def test_the_sliding_friction_at_its_speed_both_ways(self):
         *_, sliding = drawn(**LINEAR)
         assert sliding.x == [-5.0, 5.0]
@@ -507,14 +438,6 @@ class TestFigure:
         friction = rested.parameters["sliding_friction"].value
         assert np.max(np.abs(bins.y - expected)) < 0.05 * friction
 
-    def test_the_legend_hides_nothing(self, figure):
-        axes = panel_of(figure)
-        figure.canvas.draw()
-        box = axes.get_legend().get_window_extent()
-        for line in axes.lines:
-            for x, y in axes.transData.transform(line.get_xydata()):
-                assert not box.contains(x, y)
-
     def test_the_model_is_drawn_at_its_own_time(self, rested, figure):
         """Rests before and after the motion are not simulated."""
         (axes,) = [one for one in figure.axes if one.get_label() == "stem"]
@@ -530,12 +453,6 @@ class TestFigure:
         cases = [Case.of("none", bare), Case.of("curve", rested)]
         axes = panel_of(friction_figure(cases, "two"))
         assert len(axes.get_legend().get_texts()) == 3
-
-    def test_in_a_report(self, rested):
-        drawing = rested.drawing
-        (axes,) = evidence_figure(drawing).axes
-        assert axes.get_xlabel() == "stem speed [mm/s]"
-        assert "No law of friction is assumed" in drawing.caption
 
 
 @pytest.fixture(scope="module")
@@ -589,15 +506,6 @@ class TestSignature:
         np.testing.assert_array_equal(model.get_ydata(), found.stem.simulated * 1e3)
         assert points.get_xdata().size == 5
 
-    def test_words(self, figure, found):
-        title = " ".join(figure._suptitle.get_text().split())
-        one = found.parameters["coulomb_friction"]
-        assert f"$F_c$ {with_width(one.value, one.half_width)} N (weak)" in title
-        assert f"fit {100 * found.fit:.2f} %" in title
-        assert "dead zone 29.6" in signature_and_validation_panels(figure)["signature"].get_title()
-        assert signature_and_validation_panels(figure)["signature"].get_xlabel() == "pressure [kPa]"
-        assert signature_and_validation_panels(figure)["signature"].get_ylabel() == "stem [mm]"
-
 
 class TestValidation:
     @pytest.fixture(scope="class")
@@ -615,14 +523,6 @@ class TestValidation:
         np.testing.assert_array_equal(pressure.get_ydata(), validation.recording.pressure / 1e3)
         assert drawn["pressure"].get_xlabel() == "time [s]"
         assert "[mm]" in drawn["stem"].get_ylabel()
-
-    def test_title_and_file(self, validation, tmp_path):
-        figure = validation_figure(validation, BENCH_VALVE)
-        title = " ".join(figure._suptitle.get_text().split())
-        assert title.startswith(f"fit {100 * validation.fit:.2f} %; rms ")
-        assert "of travel" in title
-        figure.savefig(tmp_path / "validation.png")
-        assert matplotlib.image.imread(tmp_path / "validation.png").shape[0] > 500
 
 
 MILLIMETRE = 1 / 25.4
@@ -657,14 +557,6 @@ def test_every_axis_has_its_unit_and_the_width_fits(figures, name):
         assert ("[" in axes.get_xlabel()) == shown
 
 
-@pytest.mark.parametrize("name", ["histogram", "correlation"])
-def test_two_of_half_the_width_stand_beside_each_other(figures, name):
-    figure = figures[name]
-    assert 2 * figure.get_figwidth() < PRINTABLE * MILLIMETRE
-    (axes,) = figure.axes
-    assert "[" in axes.get_xlabel()
-
-
 def test_the_loop_of_the_baseline_lies_below_that_of_now(record, result):
     healthy = Recording(0.01, record.pressure * 1.1, record.position)
     (axes,) = signature_loop_figure(result, healthy).axes
@@ -673,14 +565,6 @@ def test_the_loop_of_the_baseline_lies_below_that_of_now(record, result):
     np.testing.assert_allclose(before.get_xdata(), healthy.pressure / 1e3)
     np.testing.assert_allclose(now.get_xdata(), record.pressure / 1e3)
     assert before.get_color() != now.get_color()
-
-
-def test_record_and_loop_show_what_was_measured(figures, record):
-    pressure, stem = (report_figures_lines(axes)[0] for axes in figures["record"].axes)
-    np.testing.assert_allclose(pressure, [record.time, record.pressure / 1e3])
-    np.testing.assert_allclose(stem, [record.time, record.position * 1e3])
-    (loop,) = report_figures_lines(figures["loop"].axes[0])
-    np.testing.assert_allclose(loop, [record.pressure / 1e3, record.position * 1e3])
 
 
 def test_the_sweep_marks_choice_and_region_in_every_panel(figures, result):

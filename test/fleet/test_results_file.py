@@ -342,10 +342,6 @@ def test_text_from_outside_is_text():
     assert page.links == ["plant_reports/a%20b%26%3C.html"]
 
 
-def test_a_page_of_no_valves():
-    assert "Friction of 0 valves" in page_text([], "plant")
-
-
 def test_the_picture():
     """It stays within its frame, and a point is kept only where the line has moved."""
     drive = [1e5 + 4e4 * math.sin(number / 5000) for number in range(100_000)]
@@ -358,10 +354,6 @@ def test_the_picture():
     assert {round(x) for x, _ in points} >= {2, WIDTH // 2, WIDTH - 2}
     assert all(0 <= x <= WIDTH and 0 <= y <= HEIGHT for x, y in points)
     assert points[0][1] == pytest.approx(HEIGHT - 1)  # a closed valve is drawn at the bottom
-
-
-def test_the_picture_of_a_stem_at_rest():
-    assert signature_points(Recording(0.1, [1e5] * 3, [0.0] * 3)) == f"1.0,{HEIGHT - 1:.1f}"
 
 
 def test_a_report_that_cannot_be_written_is_one_more_warning(tmp_path):

@@ -61,9 +61,6 @@ class TestBounds:
         with pytest.raises(ValueError, match="needs a coulomb friction or a sliding friction"):
             Baseline()
 
-    def test_a_given_value_has_no_width(self):
-        assert Baseline(100.0).half_width == 0.0
-
 
 def test_it_is_told_on_one_line():
     sliding = SlidingFriction(205.5, 3.25, 9.5e-3)

@@ -84,19 +84,6 @@ class TestSettings:
         with pytest.raises(ValueError, match=r"^window must be"):
             replaced(window=value)
 
-    @pytest.mark.parametrize("value", [0, -5, 3, 30])
-    def test_impossible_derivative_windows_are_named(self, value):
-        """Before a record is gathered for it, not when that record is identified."""
-        with pytest.raises(
-            ValueError, match=r"^derivative_window must be odd and at least order \+ 2"
-        ):
-            IdentificationSettings(derivative_window=value)
-
-    def test_no_baseline_no_derivative_window_and_a_minute_at_first(self):
-        baseline = FrictionMonitor(SETTINGS).baseline
-        assert (baseline, SETTINGS.identification.derivative_window) == (None, None)
-        assert SETTINGS.window == 60.0
-
 
 class TestRefusalsInARow:
     """Bad records are a fault; records with too little motion are none."""
@@ -166,13 +153,6 @@ class TestLongRecord:
 
 
 class TestIdentification:
-    def test_input_is_the_buffer_and_the_settings(self, loose_record):
-        monitor = FrictionMonitor(SETTINGS)
-        feed(monitor, loose_record)
-        snapshot, settings = monitor.input()
-        assert settings is SETTINGS
-        np.testing.assert_array_equal(snapshot.recording().position, loose_record.position)
-
     @pytest.mark.parametrize(
         ("name", "method"),
         [("plant", identify_plant), ("best", identify_plant), ("refined", identify_bench)],
@@ -209,13 +189,6 @@ class TestIdentification:
         assert found.values["mass"] == 1.25
         assert found.estimate.settings.published_window == 21
         assert found.derivative_window == 21
-
-    def test_a_refusal_has_its_cause(self):
-        snapshot = FrictionMonitor(SETTINGS).buffer.snapshot()
-        with pytest.raises(RefusalError) as refusal:
-            identify_snapshot(snapshot, SETTINGS)
-        assert str(refusal.value).startswith("no samples of actuator_pressure")
-        assert "cleared" not in str(refusal.value)
 
     def test_and_why_the_buffer_was_emptied(self):
         monitor = FrictionMonitor(SETTINGS)
@@ -296,16 +269,6 @@ class TestInternalError:
             "internal error: a bug; before: no estimate: nothing has been identified yet"
         )
 
-    @pytest.mark.parametrize("times", [1.0, 1.5])
-    def test_the_ratio_stays(self, result, times):
-        monitor = compared_with(Baseline(coulomb_friction(result).value / times))
-        monitor.accept(result, START)
-        ratio = monitor.diagnosis().ratio
-        monitor.fail("internal error: a bug")
-        found = monitor.diagnosis()
-        expected = Level.ERROR, StatusSignal.CHECK_FUNCTION, ratio
-        assert (found.level, found.status_signal, found.ratio) == expected
-
     def test_an_alarm_stays(self, result):
         monitor = compared_with(Baseline(coulomb_friction(result).value / 3))
         monitor.accept(result, START)
@@ -317,13 +280,6 @@ class TestInternalError:
 
 
 class TestBaseline:
-    def test_a_given_value(self, result):
-        monitor = compared_with(Baseline(100.0))
-        assert monitor.baseline == Baseline(100.0, 0.0)
-        monitor.accept(result, START)
-        ratio = monitor.diagnosis().ratio
-        assert ratio.value == coulomb_friction(result).value / 100.0
-
     def test_of_the_latest_assessment_with_its_interval(self, result, with_values, friction):
         monitor = FrictionMonitor(SETTINGS)
         monitor.accept(result, START)
@@ -350,11 +306,6 @@ class TestBaseline:
             monitor.result_as_baseline()
         assert monitor.baseline_lacks() == (BaselineLack("result", Lack.RESULT),)
         assert monitor.baseline is None
-
-    def test_however_small(self, with_values, friction):
-        monitor = FrictionMonitor(SETTINGS)
-        monitor.accept(with_values(coulomb_friction=friction(0.5, 0.05)), START)
-        assert monitor.result_as_baseline().coulomb_friction == 0.5
 
     @pytest.mark.parametrize("name", ["coulomb_friction", "sliding_friction"])
     def test_needs_a_friction(self, with_values, name):

@@ -7,29 +7,36 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""An alarm on friction stands while later records cannot be compared with the baseline."""
+"""What a monitor goes on with: a standing alarm, numbers found on a valve, an earlier estimate."""
 
 import contextlib
+import math
 import sqlite3
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
-from histories import DAY, START, VALVE
+from histories import DAY, SECOND, START, VALVE, parameter, success
 
 from valve_friction_ros.health import (
     Baseline,
+    Diagnosis,
     FrictionLimits,
     FrictionMonitor,
     FrictionState,
+    KnownNumbers,
     Level,
+    Measured,
     MonitorSettings,
     SlidingFriction,
     StatusSignal,
+    diagnose,
 )
 from valve_friction_ros.history import HistoryFile, entry_of
 from valve_friction_ros.identification import RefusalError
-from valve_friction_ros.model import BENCH_VALVE
+from valve_friction_ros.model import BENCH_VALVE, Valve
 from valve_friction_ros.streams.record_buffer import RecordBuffer
+from valve_friction_ros.wording import quoted
 
 HEALTHY = Baseline(sliding=SlidingFriction(150.0, 3.0, 2e-3))
 OTHER = Baseline(sliding=SlidingFriction(400.0, 3.0, 2e-3))
@@ -293,3 +300,223 @@ class TestRestart:
         monitor = self.again(kept)
         monitor.renew(kept.time + 1)
         assert monitor.diagnosis().level is Level.OK
+
+
+TRAVEL = 0.03
+ACTUATOR = Valve(diaphragm_area=0.04, pressure_reference=1e5, travel=TRAVEL)
+WHOLE = {
+    "spring_constant": Measured(2e5, 1e3),
+    "lower_stop": Measured(0.0, 1e-5),
+    "lowest_position": Measured(0.0, 1e-5),
+    "highest_position": Measured(0.025, 1e-5),
+}
+WITHIN = {"lowest_position": Measured(0.01, 1e-5), "highest_position": Measured(0.02, 1e-5)}
+LOST = {**WHOLE, "lower_stop": Measured(2e-3, 1e-5), "lowest_position": Measured(2e-3, 1e-5)}
+WEAK = {**WHOLE, "spring_constant": Measured(1.2e5, 1e3)}
+HEALTHY_NUMBERS = Baseline(150.0, numbers=WHOLE)
+
+
+def after(*records):
+    """What is known after records, one a day."""
+    known = KnownNumbers()
+    for day, numbers in enumerate(records):
+        known = known.followed_by(numbers, day * DAY)
+    return known
+
+
+@pytest.mark.parametrize(
+    ("changed", "level", "words"),
+    [(LOST, Level.WARN, "travel is lost"), (WEAK, Level.ERROR, "the spring constant has changed")],
+)
+def test_a_weaker_record_leaves_the_finding_and_its_date(changed, level, words):
+    (at_first,) = after(WHOLE, changed).findings(HEALTHY_NUMBERS, ACTUATOR)
+    assert (at_first.level, "measured" in at_first.message) == (level, False)
+    (later,) = after(WHOLE, changed, WITHIN, {}).findings(HEALTHY_NUMBERS, ACTUATOR)
+    assert (later.level, later.status_signal) == (level, at_first.status_signal)
+    assert words in later.message
+    assert later.message.endswith("(measured 1970-01-02 00:00 UTC; no record since shows it)")
+
+
+@pytest.mark.parametrize("changed", [LOST, WEAK])
+def test_a_new_measurement_ends_it(changed):
+    assert after(changed, WITHIN, WHOLE).findings(HEALTHY_NUMBERS, ACTUATOR) == ()
+
+
+def test_a_stem_that_goes_beyond_the_stop_ends_it():
+    known = after(LOST, {"lowest_position": Measured(0.0, 1e-5)})
+    assert "lower_stop" not in known.dated
+    assert known.findings(HEALTHY_NUMBERS, ACTUATOR) == ()
+
+
+def test_a_record_that_is_older_than_others_replaces_none_of_theirs():
+    known = after(WHOLE, LOST).with_record(WEAK, 0)
+    assert known.dated == after(WEAK, LOST).dated
+    assert known.latest == DAY
+
+
+def test_what_was_measured_since_a_time():
+    known = after(WHOLE, WITHIN)
+    assert known.since(None) == known
+    assert known.since(DAY).dated.keys() == set()
+    assert known.since(0).dated == known.dated
+
+
+def test_the_reach_is_that_of_the_farthest_record_until_a_stop_is_met():
+    known = after(WHOLE, WITHIN)
+    assert known.numbers["highest_position"] == WHOLE["highest_position"]
+    assert known.of_latest == {}
+    assert known.followed_by(LOST, 9 * DAY).numbers == LOST
+
+
+class TestMonitor:
+    @pytest.fixture
+    def monitor(self, monkeypatch, unknown):
+        """A monitor of a valve that has lost travel, and then shows nothing of it."""
+        monitor = FrictionMonitor(MonitorSettings(ACTUATOR))
+        monitor.baseline = HEALTHY_NUMBERS
+        monkeypatch.setattr(
+            "valve_friction_ros.health.friction_monitor.valve_numbers",
+            lambda found: found.numbers,
+        )
+        for time, numbers in ((0, LOST), (DAY, WITHIN)):
+            friction = {"coulomb_friction": unknown()}
+            unclear = Diagnosis(Level.OK, StatusSignal.GOOD, quoted(""), None)
+            found = SimpleNamespace(
+                numbers=numbers,
+                parameters=friction,
+                sliding_speed=math.nan,
+                diagnosis=unclear,
+                baseline=HEALTHY_NUMBERS,
+                limits=FrictionLimits(),
+            )
+            monitor.accept(found, time)
+        return monitor
+
+    def test_the_finding_stays(self, monitor):
+        (finding,) = monitor.findings
+        assert "travel is lost" in finding.message
+        assert monitor.changes["lower_stop"].value == pytest.approx(2e-3)
+
+    def test_another_baseline_drops_it(self, monitor):
+        monitor.baseline = HEALTHY_NUMBERS
+        assert monitor.findings == ()
+
+    def test_another_valve_drops_it(self, monitor):
+        settings = monitor.settings
+        monitor.change_settings(replace(settings, window=20.0))
+        assert monitor.findings
+        monitor.change_settings(replace(settings, valve=replace(ACTUATOR, travel=0.04)))
+        assert monitor.findings == ()
+
+
+HEALTHY_FRICTION = Baseline(100.0, 1.0)
+EARLIER_ALARM = Diagnosis(
+    Level.ERROR, StatusSignal.FAILURE, quoted("excess friction: 4 times; so"), None
+)
+DOUBT = "the Karnopp model does not describe this valve (9 µm of misfit)"
+
+
+def kept_estimate(friction=400.0, diagnosis=EARLIER_ALARM, baseline=HEALTHY_FRICTION, **changes):
+    return replace(success(START, friction, baseline=baseline, **changes), diagnosis=diagnosis)
+
+
+def monitor_with(earlier, baseline=HEALTHY_FRICTION, limits=None):
+    monitor = FrictionMonitor(MonitorSettings(BENCH_VALVE, limits=limits or FrictionLimits()))
+    monitor.baseline = baseline
+    monitor.remember(earlier)
+    return monitor
+
+
+@pytest.mark.parametrize(
+    ("age", "words"),
+    [
+        (0, "0 s ago, "),
+        (119 * SECOND, "119 s ago, "),
+        (120 * SECOND, "2 min ago, "),
+        (119 * 60 * SECOND, "119 min ago, "),
+        (3.9 * 3600 * SECOND, "3 h ago, "),
+        (2 * DAY, "2 days ago, "),
+        (-1, "in the future: a clock has been set back since, "),
+    ],
+)
+def test_the_alarm_goes_on_with_its_age(age, words):
+    earlier = kept_estimate()
+    monitor = monitor_with(earlier)
+    assert monitor.diagnosis() == EARLIER_ALARM
+    told = f"{EARLIER_ALARM.message} (identified {words}before the restart)"
+    aged = monitor.diagnosis(START + int(age))
+    assert aged.message == told
+    assert replace(aged, statement=EARLIER_ALARM.statement) == EARLIER_ALARM
+    assert (monitor.estimate, monitor.earlier) == (earlier, earlier)
+    assert (monitor.result, monitor.stamp) == (None, START)
+
+
+def test_the_first_result_ends_it(result):
+    monitor = monitor_with(kept_estimate())
+    monitor.accept(result, START + 1)
+    assert (monitor.estimate, monitor.earlier, monitor.stamp) == (result, None, START + 1)
+    assert monitor.diagnosis(START + 2) == diagnose(result, BENCH_VALVE, HEALTHY_FRICTION)
+
+
+def test_a_refusal_and_a_bug_leave_it():
+    monitor = monitor_with(kept_estimate())
+    monitor.refuse(RefusalError("the stem did not move"))
+    told = monitor.diagnosis(START)
+    assert told.level == Level.ERROR
+    assert told.message == (
+        "the latest identification was refused: the stem did not move; before: "
+        f"{EARLIER_ALARM.message} (identified 0 s ago, before the restart)"
+    )
+    monitor.fail("internal error: a bug")
+    assert monitor.diagnosis().level == Level.ERROR
+
+
+def test_it_is_no_baseline():
+    with pytest.raises(RefusalError, match="no result to take as baseline"):
+        monitor_with(kept_estimate()).result_as_baseline()
+
+
+class TestAgain:
+    """The kept frictions count where something else is in force by now."""
+
+    def test_another_baseline(self):
+        monitor = monitor_with(kept_estimate(), Baseline(400.0, 1.0))
+        assert monitor.diagnosis().level == Level.OK
+        assert monitor.diagnosis().ratio.value == 1.0
+        monitor.baseline = Baseline(300.0, 1.0)
+        assert monitor.diagnosis().level == Level.WARN
+        monitor.baseline = HEALTHY_FRICTION
+        assert monitor.diagnosis() == EARLIER_ALARM
+
+    def test_a_baseline_that_was_set_since(self):
+        calm = Diagnosis(Level.OK, StatusSignal.GOOD, quoted("no baseline yet; so"), None)
+        monitor = monitor_with(kept_estimate(diagnosis=calm, baseline=None))
+        assert monitor.diagnosis().level == Level.ERROR
+        assert monitor.diagnosis().message.startswith("excess friction: coulomb friction is 4.00 (")
+
+    def test_other_limits(self):
+        monitor = monitor_with(kept_estimate(), limits=FrictionLimits(1.25, 5.0))
+        assert monitor.diagnosis().level == Level.WARN
+
+    def test_without_a_baseline_the_alarm_stays(self):
+        assert monitor_with(kept_estimate(), None).diagnosis() == EARLIER_ALARM
+
+    @pytest.mark.parametrize("value", [float("nan"), -3.0])
+    def test_what_cannot_be_compared_stays(self, value):
+        """Such as friction that has vanished: no number, and an alarm."""
+        earlier = kept_estimate(
+            parameters={"coulomb_friction": parameter("coulomb_friction", value)}
+        )
+        assert monitor_with(earlier, Baseline(50.0)).diagnosis() == EARLIER_ALARM
+
+    def test_a_doubt_about_the_model_stays(self):
+        doubted = replace(
+            EARLIER_ALARM,
+            statement=quoted(f"{DOUBT}; {EARLIER_ALARM.message}"),
+            doubt=quoted(DOUBT),
+        )
+        monitor = monitor_with(kept_estimate(diagnosis=doubted), Baseline(400.0, 1.0))
+        diagnosis = monitor.diagnosis()
+        assert diagnosis.level == Level.OK
+        assert str(diagnosis.doubt) == DOUBT
+        assert diagnosis.message.startswith(f"{DOUBT}; friction normal: coulomb friction is 1.00")

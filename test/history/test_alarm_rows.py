@@ -182,35 +182,47 @@ def test_a_followed_file_of_version_8_opens_and_sends_alarms(tmp_path):
 # Lists
 
 
+def event_row(connection, valve, uid):
+    return {
+        "valve_id": valve_id(connection, valve),
+        "uid": uid,
+        "time_ns": START,
+        "kind": HIGH.value,
+        "action": "RAISE",
+        "state_before": "NORMAL",
+        "state": "UNACKNOWLEDGED",
+        "level": 1,
+        "status_signal": "M",
+        "message": "friction has grown",
+        "raised_ns": START,
+        "until_ns": None,
+        "who": "",
+        "text": "",
+    }
+
+
 def fill_many(place, count):
     """Write events of 500 valves in ten areas, as `follow_alarms` does, in one transaction."""
     kinds, states = [*AlarmKind], [*AlarmState]
+    valves = [KeptValve(f"/area_{k % 10}/fv_{k}/identifier", f"FV-{k}") for k in range(500)]
     with writing(place) as connection:
-        valves = [
-            valve_id(connection, KeptValve(f"/area_{k % 10}/fv_{k}/identifier", f"FV-{k}"))
-            for k in range(500)
-        ]
+        ids = [valve_id(connection, one) for one in valves]
         rows = []
         for k in range(count):
             state = states[k % 6]
             level = int(state in (AlarmState.UNACKNOWLEDGED, AlarmState.ACKNOWLEDGED))
-            until = START + DAY if state.is_suppressed else None
             rows.append(
-                {
-                    "valve_id": valves[k % 500],
-                    "uid": f"{k}",
+                event_row(connection, valves[0], f"{k}")
+                | {
+                    "valve_id": ids[k % 500],
                     "time_ns": START + k * 60 * SECOND,
                     "kind": kinds[k // 500 % 6].value,
-                    "action": "RAISE",
-                    "state_before": "NORMAL",
                     "state": state.name,
                     "level": level,
                     "status_signal": "M" if level else "",
                     "message": f"friction has grown by {k % 100} %",
-                    "raised_ns": START,
-                    "until_ns": until,
+                    "until_ns": START + DAY if state.is_suppressed else None,
                     "who": "A. Operator" if k % 7 == 0 else "",
-                    "text": "",
                 }
             )
         put(connection, tables.alarm_event, rows)
@@ -323,25 +335,7 @@ def test_alarms_on_a_server_are_answered_once_unless_a_file_keeps_them(history, 
 def test_five_hundred_are_acknowledged_at_once_and_their_nodes_learn_it(history):
     valves = [KeptValve(f"/area/fv_{k}/identifier", f"FV-{k}") for k in range(500)]
     with writing(history.path) as connection:
-        rows = [
-            {
-                "valve_id": valve_id(connection, one),
-                "uid": one.tag,
-                "time_ns": START,
-                "kind": HIGH.value,
-                "action": "RAISE",
-                "state_before": "NORMAL",
-                "state": "UNACKNOWLEDGED",
-                "level": 1,
-                "status_signal": "M",
-                "message": "friction has grown",
-                "raised_ns": START,
-                "until_ns": None,
-                "who": "",
-                "text": "",
-            }
-            for one in valves
-        ]
+        rows = [event_row(connection, one, one.tag) for one in valves]
         put(connection, tables.alarm_event, rows)
     feed = AlarmFeed(history.path)
     feed.look()

@@ -7,17 +7,35 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Drift of the Coulomb friction: coverage on simulated histories, days, outliers, limits."""
+"""What an identification becomes in the history, and the drift of the friction along it."""
 
+import json
 import math
 
 import numpy as np
 import pytest
-from histories import DAY, SECOND, START
-from scipy.stats import binom
+from histories import DAY, SECOND, START, VALVE, parameter, refused, success
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.stats import binom, linregress
 
-from valve_friction_ros.health import Baseline, DatedNumber, FrictionLimits, SlidingFriction
-from valve_friction_ros.history import MONTH, Limit, trend_of
+from valve_friction_ros import __version__
+from valve_friction_ros.health import (
+    Baseline,
+    DatedNumber,
+    FrictionLimits,
+    FrictionMonitor,
+    Measured,
+    MonitorSettings,
+    RefusedRecordError,
+    SlidingFriction,
+    identify_snapshot,
+)
+from valve_friction_ros.history import MONTH, Limit, entry_of, trend_of
+from valve_friction_ros.history.entry import settings_text
+from valve_friction_ros.history.trend import ScatteredLine, fit_line
+from valve_friction_ros.identification import IdentificationSettings, RefusalError, Verdict
+from valve_friction_ros.model import BENCH_VALVE, LOW_FRICTION, SineWave, Valve, simulate
 
 NOON = START // DAY * DAY + DAY // 2
 RUNS = 400
@@ -207,3 +225,193 @@ def test_against_a_baseline_of_sliding_friction_its_limits_count():
     assert trend.crossing.level == pytest.approx(250.0)
     assert trend.crossing.time == pytest.approx(NOON + 30 * DAY, rel=1e-6)
     assert trend_of(rising).what == "coulomb friction"
+
+
+TIMES = np.array([0.0, 1.0, 3.0, 4.0, 7.0])
+
+
+def test_exact_estimates_on_a_line():
+    line = fit_line(TIMES, 100.0 + 2.0 * TIMES, np.zeros(5))
+    assert line.slope == pytest.approx(2.0, rel=1e-9)
+    assert line.at(10.0) == pytest.approx(120.0, rel=1e-9)
+    assert line.scatter == 0.0
+    assert line.slope_half_width < 1e-6
+
+
+def test_known_errors_alone():
+    """Without scatter, the textbook's weighted line; its errors are not scaled down."""
+    errors = np.array([1.0, 2.0, 1.0, 4.0, 2.0])
+    line = fit_line(TIMES, 5.0 - 0.5 * TIMES, errors)
+    weights = errors**-2
+    centre = weights @ TIMES / weights.sum()
+    assert line.centre == pytest.approx(centre)
+    assert line.level_error == pytest.approx(weights.sum() ** -0.5)
+    assert line.slope_error == pytest.approx((weights @ (TIMES - centre) ** 2) ** -0.5)
+    assert line.scatter == 0.0
+
+
+def test_scatter_alone_is_the_ordinary_regression():
+    """Estimates that look exact: their intervals tell nothing, their scatter all."""
+    values = np.array([100.0, 104.0, 103.0, 109.0, 111.0])
+    line, ordinary = fit_line(TIMES, values, np.full(5, 1e-6)), linregress(TIMES, values)
+    assert line.slope == pytest.approx(ordinary.slope, rel=1e-9)
+    assert line.slope_error == pytest.approx(ordinary.stderr, rel=1e-6)
+    residual = values - ordinary.intercept - ordinary.slope * TIMES
+    assert line.scatter == pytest.approx(math.sqrt(residual @ residual / 3), rel=1e-6)
+    assert line.freedom == 3
+    assert line.quantile == pytest.approx(3.182446, rel=1e-6)  # of Student's t, from the tables
+
+
+def test_scatter_brings_chi_squared_to_its_freedom():
+    values = np.array([100.0, 106.0, 101.0, 111.0, 109.0])
+    errors = np.array([1.0, 2.0, 1.5, 1.0, 3.0])
+    line = fit_line(TIMES, values, errors)
+    assert line.scatter > 0
+    residual = values - line.at(TIMES)
+    assert residual**2 @ (1 / (errors**2 + line.scatter**2)) == pytest.approx(3.0, rel=1e-9)
+
+
+@given(st.floats(-1e6, 1e6), st.floats(0.01, 1e4), st.integers(0, 2**32))
+def test_units_do_not_matter(origin, unit, seed):
+    rng = np.random.default_rng(seed)
+    values, errors = 100 + rng.normal(0, 3, 5), rng.uniform(0.5, 3, 5)
+    line, other = fit_line(TIMES, values, errors), fit_line(TIMES, unit * values, unit * errors)
+    assert other.slope == pytest.approx(unit * line.slope, rel=1e-6, abs=1e-9 * unit)
+    assert other.slope_error == pytest.approx(unit * line.slope_error, rel=1e-6)
+    moved = fit_line(TIMES + origin, values, errors)
+    assert moved.slope == pytest.approx(line.slope, rel=1e-6, abs=1e-6)
+
+
+def line_with(**changes):
+    defaults = {
+        "centre": 2.0,
+        "level": 100.0,
+        "slope": 5.0,
+        "level_error": 1.0,
+        "slope_error": 0.5,
+        "scatter": 0.0,
+        "freedom": 10,
+    }
+    return ScatteredLine(**{**defaults, **changes})
+
+
+@pytest.mark.parametrize("slope", [5.0, -5.0])
+@pytest.mark.parametrize("level", [150.0, 101.0, 20.0])
+@pytest.mark.parametrize("level_error", [0.0, 2.0])
+def test_the_crossing_is_where_line_and_level_are_as_far_apart_as_their_interval(
+    slope, level, level_error
+):
+    line = line_with(slope=slope)
+    expected, *ends = line.crossing(level, level_error)
+    assert line.at(expected) == pytest.approx(level)
+    assert ends[0] < expected < ends[1]
+    for end in ends:
+        error = math.hypot(line.half_width(end), line.quantile * level_error)
+        assert abs(line.at(end) - level) == pytest.approx(error)
+
+
+def test_no_crossing_without_a_slope():
+    assert line_with(slope_error=2.3).crossing(150.0, 0.0) is None  # 2.3 · 2.228 > 5
+    assert line_with(slope_error=2.2).crossing(150.0, 0.0) is not None
+
+
+@pytest.mark.parametrize("times", [TIMES[:3], np.zeros(5)], ids=["three", "one time"])
+def test_too_little(times):
+    with pytest.raises(ValueError, match="a line needs 4 estimates at several times"):
+        fit_line(times, np.ones(times.size), np.ones(times.size))
+
+
+PERIOD = 10_000_000
+
+
+@pytest.fixture
+def monitor():
+    """A monitor that has gathered five seconds; the pressure begins a sample later."""
+    monitor = FrictionMonitor(MonitorSettings(BENCH_VALVE))
+    pressure = SineWave(period=5.0).sample(np.arange(500) / 100)
+    position = simulate(BENCH_VALVE, LOW_FRICTION, pressure, 0.01).position
+    for k in range(500):
+        if k:
+            monitor.buffer.add_pressure(k * PERIOD, pressure[k])
+        monitor.buffer.add_position(k * PERIOD, position[k])
+    return monitor
+
+
+def test_a_success(monitor):
+    snapshot = monitor.buffer.snapshot()
+    result = identify_snapshot(snapshot, monitor.settings)
+    monitor.accept(result, START)
+    baseline = monitor.baseline = monitor.result_as_baseline()
+    entry = entry_of(monitor, VALVE, snapshot, monitor.settings, START)
+    assert entry.parameters == dict(result.parameters)
+    assert entry.span == (0, 499 * PERIOD)
+    assert entry.fit == (
+        result.fit,
+        result.rms,
+        result.misfit.systematic,
+    )
+    assert entry.diagnosis == monitor.diagnosis()
+    assert entry.diagnosis.ratio.value == 1.0
+    assert (entry.baseline, entry.limits) == (baseline, monitor.settings.limits)
+    assert entry.warnings == result.warnings
+    assert (entry.time, entry.valve, entry.refusal) == (START, VALVE, "")
+    assert entry.method == result.method == "plant"
+    assert entry.version == __version__
+
+
+def test_a_refusal(monitor):
+    """It keeps why, and nothing of the estimate before it."""
+    snapshot = monitor.buffer.snapshot()
+    monitor.accept(identify_snapshot(snapshot, monitor.settings), START)
+    refusal = RefusedRecordError("too little travel", {"stem_noise": Measured(1e-5, 1e-7)})
+    entry = entry_of(monitor, VALVE, snapshot, monitor.settings, START, refusal)
+    assert entry.refusal == "too little travel"
+    assert entry.numbers == refusal.numbers
+    assert not entry.parameters
+    assert entry.friction is None
+    assert entry.point() is None
+    assert entry.span == (0, 499 * PERIOD)
+
+
+def test_a_refusal_of_nothing(monitor):
+    monitor.buffer.clear("on request")
+    empty, refusal = monitor.buffer.snapshot(), RefusalError("no samples")
+    assert entry_of(monitor, VALVE, empty, monitor.settings, START, refusal).span is None
+
+
+@pytest.mark.parametrize(("name", "method"), [("best", "plant"), ("bench", "bench")])
+def test_a_refusal_has_the_method_that_would_have_identified(name, method):
+    monitor = FrictionMonitor(MonitorSettings(BENCH_VALVE, method=name))
+    empty, refusal = monitor.buffer.snapshot(), RefusalError("no samples")
+    entry = entry_of(monitor, VALVE, empty, monitor.settings, START, refusal)
+    assert entry.method == method
+
+
+def test_neither_a_success_nor_a_refusal_or_both():
+    for changes in ({"parameters": {}}, {"refusal": "why"}):
+        with pytest.raises(ValueError, match="either parameters or the reason"):
+            success(**changes)
+
+
+@pytest.mark.parametrize("verdict", Verdict)
+def test_only_what_was_measured_makes_a_trend(verdict):
+    expected = DatedNumber(START, 150.0, 3.0)
+    measured = verdict in (Verdict.IDENTIFIED, Verdict.WEAK)
+    assert success(verdict=verdict).point() == (expected if measured else None)
+    assert refused().point() is None
+
+
+def test_settings_are_the_same_text_for_the_same_settings():
+    one = MonitorSettings(BENCH_VALVE, IdentificationSettings(fixed={"mass": 1.6}))
+    assert settings_text(one) == settings_text(MonitorSettings(BENCH_VALVE, one.identification))
+    told = json.loads(settings_text(one))
+    assert told["identification"]["fixed"] == {"mass": 1.6}
+    assert told["valve"]["diaphragm_area"] == BENCH_VALVE.diaphragm_area
+    assert told["window"] == 60.0
+    endless = MonitorSettings(Valve(0.0445, 0.0))
+    assert json.loads(settings_text(endless))["valve"]["travel"] is None
+
+
+def test_parameters_cannot_be_changed():
+    with pytest.raises(TypeError):
+        success().parameters["mass"] = parameter("mass", 2.0)

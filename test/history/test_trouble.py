@@ -7,9 +7,10 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""A history that cannot be written or read: the cause, and what to do, in one line."""
+"""A history in trouble: disks, other programs, and several processes of which some are killed."""
 
 import contextlib
+import signal
 import sqlite3
 import subprocess
 import sys
@@ -20,6 +21,7 @@ import pytest
 from histories import START, success
 
 from valve_friction_ros.history import HistoryError, HistoryFile, database, tables
+from valve_friction_ros.history.place import Claim
 
 PROJECT = Path(__file__).resolve().parents[2]
 FOLDERS = (PROJECT / "test" / "support", PROJECT)
@@ -281,3 +283,106 @@ def test_nothing_of_a_failed_change_stays(history, monkeypatch):
     with pytest.raises(HistoryError, match="no such table"):
         history.add(success(START + 1), days=1)
     assert is_whole(history)
+
+
+WRITER = Path(__file__).with_name("history_writer.py")
+KILLED, LIVING = 4, 2
+ROWS = 25
+"""What a living writer writes, and a killed one at least."""
+
+
+def start(path, number, rows=()):
+    return subprocess.Popen(
+        [sys.executable, str(WRITER), str(path), str(number), *map(str, rows)],
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+
+
+def finished_before_the_kill(process):
+    """Kill a writer that is in the midst of it; the number of rows that it said to be finished."""
+    for _ in range(ROWS // 2 + process.number):
+        assert process.stdout.readline()
+    process.send_signal(signal.SIGKILL)
+    told = process.stdout.read()
+    assert process.wait(60) == -signal.SIGKILL
+    return ROWS // 2 + process.number + len(told.split())
+
+
+def test_no_finished_row_is_lost_and_nothing_is_corrupted(tmp_path):
+    """None of them finds the file when it starts."""
+    history = HistoryFile(tmp_path / "history.sqlite")
+    processes = []
+    for number in range(KILLED + LIVING):
+        processes.append(start(history.path, number, [ROWS] if number >= KILLED else []))
+        processes[-1].number = number
+    try:
+        finished = [finished_before_the_kill(process) for process in processes[:KILLED]]
+        for process in processes[KILLED:]:
+            told, _ = process.communicate(timeout=90)
+            assert process.returncode == 0
+            finished.append(len(told.split()))
+    finally:
+        for process in processes:
+            process.kill()
+            process.wait()
+            process.stdout.close()
+    assert finished[KILLED:] == [ROWS] * LIVING
+    connection = sqlite3.connect(history.path)
+    assert connection.execute("PRAGMA integrity_check").fetchall() == [("ok",)]
+    assert connection.execute("PRAGMA foreign_key_check").fetchall() == []
+    connection.close()
+    for number, count in enumerate(finished):
+        name = f"/fv_{number}/identifier"
+        entries = history.entries([name])
+        # At most the one under way has come besides what was told.
+        assert len(entries) in ((count, count + 1) if number < KILLED else (count,))
+        assert [one.time - START for one in entries] == [*range(len(entries))]
+        assert all(len(one.parameters) == (0 if one.refusal else 3) for one in entries)
+        baseline = history.baseline(name).baseline.coulomb_friction
+        assert baseline - 100 in (len(entries) - 1, len(entries) - 2)
+        assert baseline - 100 >= count - 1
+
+
+HOLD = """
+import sys
+from pathlib import Path
+from valve_friction_ros.history.place import Claim
+claim = Claim(Path(sys.argv[1]), "/fv_101/identifier")
+print(claim.ask(), flush=True)
+sys.stdin.read()
+"""
+
+
+def test_one_claim_a_valve(tmp_path):
+    path = tmp_path / "history.sqlite"
+    one, other, same = (Claim(path, name) for name in ("/fv_101", "/fv_102", "/fv_101"))
+    assert one.ask()
+    assert one.ask()
+    assert other.ask()
+    assert not same.ask()
+    assert Claim(tmp_path / "other.sqlite", "/fv_101").ask()
+    one.release()
+    assert same.ask()
+    for claim in (other, same):
+        claim.release()
+
+
+def test_a_killed_process_has_none(tmp_path):
+    path = tmp_path / "history.sqlite"
+    claim = Claim(path, "/fv_101/identifier")
+    command = [sys.executable, "-c", HOLD, str(path)]
+    with subprocess.Popen(
+        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as holder:
+        assert holder.stdout.readline() == "True\n"
+        assert not claim.ask()
+        holder.kill()
+    assert claim.ask()
+    claim.release()
+
+
+def test_a_folder_that_is_not_there_grants_it(tmp_path):
+    claim = Claim(tmp_path / "nowhere" / "history.sqlite", "/fv_101")
+    assert claim.ask()
+    claim.release()

@@ -14,6 +14,7 @@ import math
 import subprocess
 import sys
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -82,6 +83,12 @@ def square():
     return SensorNoise(10e-6, 100.0).applied_to(Recording(PERIOD, pressure, position))
 
 
+@cache
+def by(record, method=DEFAULT_METHOD, **settings):
+    """Identify once for each record, method and settings."""
+    return identify(record, BENCH_VALVE, IdentificationSettings(**settings), method)
+
+
 def true_value(name, result):
     """Return a parameter of the packing; its sliding friction at the speed of the result."""
     sliding = TRUTH["coulomb_friction"] + TRUTH["viscous_friction"] * result.sliding_speed
@@ -107,7 +114,7 @@ def broken(whole):
 
 @pytest.fixture(scope="module")
 def default(whole):
-    return identify(whole, BENCH_VALVE)
+    return by(whole)
 
 
 def test_the_names_that_are_offered_are_those_of_the_methods():
@@ -122,12 +129,11 @@ def test_former_names_are_understood(former):
 class TestProfiles:
     def test_plant_is_the_default(self, whole, default):
         assert DEFAULT_METHOD == default.method == "plant"
-        assert default.values == pytest.approx(
-            identify_plant(whole, BENCH_VALVE).values, abs=0, nan_ok=True
-        )
+        found = identify_plant(whole, BENCH_VALVE)
+        assert default.values == pytest.approx(found.values, abs=0, nan_ok=True)
 
     def test_a_bench_has_no_imperfections(self, whole):
-        found = identify(whole, BENCH_VALVE, method="bench")
+        found = by(whole, "bench")
         assert found.method == "bench"
         for name, true in TRUTH.items():
             one = found.parameters[name]
@@ -150,8 +156,7 @@ class TestProfiles:
     @pytest.mark.parametrize("method", ["plant", "bench"])
     def test_a_position_bias_is_left_to_the_published_method(self, whole, method):
         bias = HIGH_FRICTION.spring_preload / HIGH_FRICTION.spring_constant
-        settings = IdentificationSettings(position_bias=bias)
-        plain, found = (identify(whole, BENCH_VALVE, how, method) for how in (None, settings))
+        plain, found = by(whole, method), by(whole, method, position_bias=bias)
         assert found.values == pytest.approx(plain.values, abs=0, nan_ok=True)
         preload = found.parameters["spring_preload"]
         assert preload.published == bias * found.parameters["spring_constant"].published
@@ -216,18 +221,14 @@ class TestTimingUncertainty:
 
         That is the normal prior which holds half of all lags within 4 ms too, without long tails.
         """
-        settings = IdentificationSettings(timing_uncertainty=5.9e-3)
-        stated = identify(square, BENCH_VALVE, settings).parameters
-        for name, one in identify(square, BENCH_VALVE).parameters.items():
+        stated = by(square, timing_uncertainty=5.9e-3).parameters
+        for name, one in by(square).parameters.items():
             if name in ("coulomb_friction", "viscous_friction"):
                 assert one.half_width >= 0.99 * stated[name].half_width, name
 
     def test_the_better_the_timing_is_known_the_narrower_the_intervals_are(self, square):
         """On a square wave, whose friction and spring a lag changes most."""
-        results = [
-            identify(square, BENCH_VALVE, IdentificationSettings(timing_uncertainty=timing))
-            for timing in (None, 5e-3, 0.0)
-        ]
+        results = by(square), *(by(square, timing_uncertainty=timing) for timing in (5e-3, 0.0))
         for name in ("coulomb_friction", "viscous_friction", "spring_constant", SLIDING):
             unstated, stated, known = (one.parameters[name] for one in results)
             assert known.half_width < stated.half_width < unstated.half_width, name
@@ -239,12 +240,11 @@ class TestTimingUncertainty:
 
     def test_a_bench_takes_a_stated_one(self, square):
         """And none by default: as with zero, no lag is held possible."""
-        widths = [
-            identify(
-                square, BENCH_VALVE, IdentificationSettings(timing_uncertainty=timing), "bench"
-            ).parameters["coulomb_friction"]
-            for timing in (None, 0.0, 5e-3)
-        ]
+        results = (
+            by(square, "bench"),
+            *(by(square, "bench", timing_uncertainty=timing) for timing in (0.0, 5e-3)),
+        )
+        widths = [one.parameters["coulomb_friction"] for one in results]
         assert repr(widths[0]) == repr(widths[1])
         assert widths[2].half_width > 3 * widths[0].half_width
         assert abs(widths[2].value - TRUTH["coulomb_friction"]) <= widths[2].half_width
@@ -271,8 +271,7 @@ class TestCalibration:
     def test_it_widens_the_intervals_of_every_method(self, whole, slow, method):
         """And changes no value; without it the parameters are those of the method itself."""
         record = slow if method == "signature" else whole
-        plain = IdentificationSettings(timing_uncertainty=0.0)
-        known = identify(record, BENCH_VALVE, plain, method)
+        known = by(record, method, timing_uncertainty=0.0)
         found = identify(record, BENCH_VALVE, self.SETTINGS, method)
         assert {one.uncalibrated for one in known.parameters.values()} == {None}
         for name, one in found.parameters.items():

@@ -7,65 +7,37 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Each rule of a value type refuses, and its message names the field."""
+"""Rules of value types name the field; excitations at known times, and the converter."""
 
 import dataclasses
 import math
 
 import numpy as np
 import pytest
+from scipy.signal import dlsim
 
 from valve_friction_ros.model import (
     BENCH_VALVE,
+    DEFAULT_LAG,
     GRAPHITE_PACKING,
     HIGH_FRICTION,
     LOW_FRICTION,
+    PRESSURE_RANGE,
     Drive,
+    IsaSteps,
     KarnoppParameters,
     Recording,
+    SampledPressure,
     SensorNoise,
+    SineWave,
+    SquareWave,
     StemState,
+    TriangleWave,
     Valve,
+    converter_response,
 )
-from valve_friction_ros.model.checks import require_finite, require_non_negative, require_positive
 
-NOT_NUMBERS = ["1.0", True, None, [1.0], {}]
 NOT_FINITE = [math.nan, math.inf, -math.inf]
-NEGATIVE = [-1.0, -5e-324]
-REQUIREMENTS = [require_finite, require_non_negative, require_positive]
-
-
-@pytest.mark.parametrize("require", REQUIREMENTS)
-class TestChecks:
-    @pytest.mark.parametrize("value", NOT_NUMBERS)
-    def test_refuses_what_is_no_number(self, require, value):
-        with pytest.raises(ValueError, match=r"^quantity must be a number, got"):
-            require("quantity", value)
-
-    @pytest.mark.parametrize("value", NOT_FINITE)
-    def test_refuses_what_is_not_finite(self, require, value):
-        with pytest.raises(ValueError, match=r"^quantity must be finite, got"):
-            require("quantity", value)
-
-    @pytest.mark.parametrize("value", [3, np.float32(3), np.int64(3), np.array(3.0)])
-    def test_returns_a_float(self, require, value):
-        result = require("quantity", value)
-        assert type(result) is float
-        assert result == 3.0
-
-
-def test_signs():
-    assert require_finite("quantity", -1) == -1.0
-    assert require_non_negative("quantity", 0) == 0.0
-    assert require_positive("quantity", 5e-324) == 5e-324
-    for value in NEGATIVE:
-        with pytest.raises(ValueError, match=r"^quantity must not be negative, got -"):
-            require_non_negative("quantity", value)
-    for value in [0.0, -0.0, *NEGATIVE]:
-        with pytest.raises(ValueError, match=r"^quantity must be above zero, got"):
-            require_positive("quantity", value)
-
-
 VALVE = {"diaphragm_area": 0.0445, "travel": 0.03}
 PARAMETERS = dataclasses.asdict(LOW_FRICTION)
 RECORDING = {"sample_period": 1e-3, "drive": [1.0, 2.0, 3.0], "position": [0.0, 0.1, 0.2]}
@@ -118,17 +90,6 @@ def test_static_friction_not_below_coulomb_friction():
     message = r"^static_friction \(100\) must not be below coulomb_friction \(100\)"
     with pytest.raises(ValueError, match=message):
         KarnoppParameters(**good | {"static_friction": below})
-
-
-@pytest.mark.parametrize(
-    "instance",
-    [BENCH_VALVE, LOW_FRICTION, StemState(0.0), SensorNoise(), Recording(**RECORDING)],
-    ids=lambda instance: type(instance).__name__,
-)
-def test_frozen(instance):
-    for field in dataclasses.fields(instance):
-        with pytest.raises(dataclasses.FrozenInstanceError):
-            setattr(instance, field.name, 1.0)
 
 
 class TestValve:
@@ -214,3 +175,225 @@ class TestRecording:
         assert len(recording) == 5
         assert recording.duration == 1.0
         np.testing.assert_array_equal(recording.time, [0.0, 0.25, 0.5, 0.75, 1.0])
+
+
+EPS = np.finfo(float).eps
+WAVES = [SquareWave, TriangleWave, SineWave]
+
+
+class TestWaves:
+    def test_paper_levels(self):
+        """Section 4: 15 % to 75 % of 41.74 to 206.84 kPa, 10.4 s; section 5: the sine."""
+        square, triangle, sine = SquareWave(), TriangleWave(), SineWave()
+        assert square.low == pytest.approx(41740.0 + 0.15 * 165100.0, rel=1e-15)
+        assert square.high == pytest.approx(41740.0 + 0.75 * 165100.0, rel=1e-15)
+        assert square.period == 10.4
+        assert (triangle.low, triangle.high) == PRESSURE_RANGE == (41740.0, 206840.0)
+        assert (sine.low, sine.high, sine.period) == (63950.0, 160440.0, 35.5)
+
+    @pytest.mark.parametrize(
+        ("kind", "eighths"),
+        [
+            (SquareWave, [0, 0, 0, 0, 1, 1, 1, 1]),
+            (TriangleWave, [0, 0.25, 0.5, 0.75, 1, 0.75, 0.5, 0.25]),
+            (
+                SineWave,
+                [0, 0.5 - 8**-0.5, 0.5, 0.5 + 8**-0.5, 1, 0.5 + 8**-0.5, 0.5, 0.5 - 8**-0.5],
+            ),
+        ],
+    )
+    def test_values_over_three_periods(self, kind, eighths):
+        wave = kind(low=100.0, high=300.0, period=4.0)
+        found = wave.sample(0.5 * np.arange(24))
+        expected = 100.0 + 200.0 * np.tile(eighths, 3)
+        np.testing.assert_allclose(found, expected, rtol=4 * EPS)
+
+    @pytest.mark.parametrize("kind", WAVES)
+    def test_defined_before_the_start(self, kind):
+        wave = kind(low=0.0, high=1.0, period=4.0)
+        time = np.linspace(0.05, 3.95, 40)
+        np.testing.assert_allclose(wave.sample(time - 8.0), wave.sample(time), atol=1e-14)
+
+    @pytest.mark.parametrize("kind", WAVES)
+    @pytest.mark.parametrize("period", [0.0, -1.0, math.nan, math.inf])
+    def test_refuses_a_period(self, kind, period):
+        with pytest.raises(ValueError, match=r"^period must be"):
+            kind(period=period)
+
+    @pytest.mark.parametrize("kind", WAVES)
+    def test_refuses_levels(self, kind):
+        for low, high in ((2.0, 1.0), (1.0, 1.0)):
+            with pytest.raises(ValueError, match=r"^low \(\d\) must be below high \(1\)"):
+                kind(low=low, high=high)
+        with pytest.raises(ValueError, match=r"^low must be finite"):
+            kind(low=math.nan)
+        with pytest.raises(ValueError, match=r"^high must be finite"):
+            kind(high=math.inf)
+
+
+class TestIsaSteps:
+    def test_sequence(self):
+        """Section 5: 0.1 % to 50 % about mid-range, each up, back, down and back."""
+        steps = IsaSteps()
+        middle, span = (41740.0 + 206840.0) / 2, 206840.0 - 41740.0
+        percent = np.repeat([0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50], 4)
+        offsets = percent * np.tile([1, 0, -1, 0], 9)
+        expected = np.append(middle, middle + span * offsets / 100)
+        assert steps.duration == 370.0
+        np.testing.assert_allclose(steps.levels, expected, rtol=4 * EPS)
+        assert (steps.levels.min(), steps.levels.max()) == pytest.approx(PRESSURE_RANGE, rel=1e-15)
+
+    def test_each_level_is_held(self):
+        steps = IsaSteps(centre=0.0, span=100.0, sizes=(0.1, 0.5), hold=2.0)
+        time = np.arange(0.0, 20.0, 0.5)
+        expected = np.repeat([0, 10, 0, -10, 0, 50, 0, -50, 0], 4)
+        np.testing.assert_array_equal(steps.sample(time[:36]), expected)
+        assert steps.duration == 18.0
+        np.testing.assert_array_equal(steps.sample(time[36:]), 0.0)  # held beyond the end
+        assert steps.sample(-1.0) == 0.0
+
+    @pytest.mark.parametrize(
+        ("arguments", "message"),
+        [
+            ({"centre": math.nan}, r"^centre must be finite"),
+            ({"span": 0.0}, r"^span must be above zero"),
+            ({"hold": -1.0}, r"^hold must be above zero"),
+            ({"sizes": ()}, r"^sizes must hold at least one step"),
+            ({"sizes": (0.1, 0.0)}, r"^step size must be above zero"),
+            ({"sizes": (0.1, math.nan)}, r"^step size must be finite"),
+        ],
+    )
+    def test_refusals(self, arguments, message):
+        with pytest.raises(ValueError, match=message):
+            IsaSteps(**arguments)
+
+
+class TestSampledPressure:
+    def test_linear_between_samples_and_held_outside(self):
+        # The clock of the file starts anywhere; the excitation starts at its first sample.
+        played = SampledPressure([100.0, 101.0, 103.0], [10.0, 20.0, 0.0])
+        found = played.sample([-1.0, 0.0, 0.25, 1.0, 2.0, 3.0, 9.0])
+        np.testing.assert_array_equal(found, [10.0, 10.0, 12.5, 20.0, 10.0, 0.0, 0.0])
+
+    def test_keeps_read_only_copies(self):
+        times, pressures = np.array([0.0, 1.0]), np.array([1.0, 2.0])
+        played = SampledPressure(times, pressures)
+        times[1] = pressures[1] = 9.0
+        assert played.sample(1.0) == 2.0
+        for kept in (played.times, played.pressures):
+            with pytest.raises(ValueError, match="read-only"):
+                kept[0] = 9.0
+
+    @pytest.mark.parametrize(
+        ("times", "pressures", "message"),
+        [
+            ([], [], r"^times must be a non-empty row of finite numbers"),
+            ([0.0, math.nan], [1.0, 2.0], r"^times must be a non-empty row of finite numbers"),
+            ([0.0, 1.0], [1.0, math.inf], r"^pressures must be a non-empty row of finite numbers"),
+            ([0.0, 1.0], [[1.0, 2.0]], r"^pressures must be a non-empty row of finite numbers"),
+            ([0.0, 1.0], [1.0], r"^2 times for 1 pressures"),
+            ([0.0, 0.0], [1.0, 2.0], r"^times must increase"),
+            ([1.0, 0.0], [1.0, 2.0], r"^times must increase"),
+        ],
+    )
+    def test_refusals(self, times, pressures, message):
+        with pytest.raises(ValueError, match=message):
+            SampledPressure(times, pressures)
+
+
+EXCITATIONS = [
+    SquareWave(),
+    TriangleWave(),
+    SineWave(),
+    IsaSteps(hold=0.5),
+    SampledPressure([0.0, 3.0, 11.0], [1e5, 2e5, 5e4]),
+]
+
+
+@pytest.mark.parametrize("excitation", EXCITATIONS, ids=lambda one: type(one).__name__)
+class TestEveryExcitation:
+    def test_blocks_equal_one_call(self, excitation):
+        time = 1e-3 * np.arange(20000)
+        blocks = [excitation.sample(block) for block in np.array_split(time, [1, 777, 5200, 10400])]
+        np.testing.assert_array_equal(np.concatenate(blocks), excitation.sample(time))
+
+
+class TestConverter:
+    def test_step_gives_an_exponential(self):
+        period, lag, step = 1e-3, DEFAULT_LAG, 500
+        command = np.where(np.arange(6000) < step, 6e4, 1.6e5)
+        since = period * np.maximum(np.arange(6000) - step, 0)
+        expected = 1.6e5 - 1e5 * np.exp(-since / lag)
+        found = converter_response(command, period, lag)
+        # One rounding a sample, which the filter forgets with its lag of 1300 samples.
+        np.testing.assert_allclose(found, expected, rtol=1300 * EPS)
+
+    def test_any_command_as_scipy_steps_it(self):
+        period, lag = 0.02, 0.3
+        command = np.random.default_rng(0).uniform(4e4, 2e5, 400)
+        decay = math.exp(-period / lag)
+        system = (decay, 1 - decay, 1.0, 0.0, period)  # held input, exact step
+        _, expected, _ = dlsim(system, command, x0=command[0])
+        found = converter_response(command, period, lag)
+        np.testing.assert_allclose(found, expected[:, 0], rtol=100 * EPS)
+
+    def test_begins_in_steady_state_or_as_told(self):
+        np.testing.assert_allclose(converter_response(np.full(50, 7e4), 1e-3), 7e4, rtol=50 * EPS)
+        found = converter_response(np.full(3, 7e4), 1.0, 1.0, initial=5e4)
+        expected = 7e4 - 2e4 * np.exp([0.0, -1.0, -2.0])
+        np.testing.assert_allclose(found, expected, rtol=4 * EPS)
+
+    def test_blocks_equal_one_call(self):
+        """A block that begins at the sample where the last one ended goes on from there."""
+        command = SquareWave(period=1.0).sample(1e-3 * np.arange(3000))
+        whole = converter_response(command, 1e-3)
+        head = converter_response(command[:1201], 1e-3)
+        tail = converter_response(command[1200:], 1e-3, initial=head[-1])
+        np.testing.assert_allclose(np.append(head, tail[1:]), whole, rtol=4 * EPS)
+
+    def test_refusals(self):
+        with pytest.raises(ValueError, match=r"^sample_period must be above zero"):
+            converter_response(np.ones(3), 0.0)
+        with pytest.raises(ValueError, match=r"^lag must not be negative"):
+            converter_response(np.ones(3), 1e-3, -1.0)
+
+
+class TestSensorNoise:
+    SIZE = 100_000
+
+    @pytest.fixture
+    def clean(self):
+        return Recording(1e-3, np.full(self.SIZE, 1e5), np.full(self.SIZE, 0.01), start_time=42.0)
+
+    def test_stated_deviation(self, clean):
+        noise = SensorNoise(position=10e-6, pressure=100.0, seed=4)
+        noisy = noise.applied_to(clean)
+        position, pressure = noisy.position - clean.position, noisy.pressure - clean.pressure
+        # Five standard errors: 1/√n of a mean, 1/√(2n) of a deviation, 1/√n of a correlation.
+        for found, deviation in ((position, 10e-6), (pressure, 100.0)):
+            assert abs(found.mean()) < 5 * deviation / math.sqrt(self.SIZE)
+            assert abs(found.std() / deviation - 1) < 5 / math.sqrt(2 * self.SIZE)
+        unit = position / 10e-6, pressure / 100.0
+        assert abs(np.mean(unit[0] * unit[1])) < 5 / math.sqrt(self.SIZE)
+        for one in unit:
+            assert abs(np.mean(one[1:] * one[:-1])) < 5 / math.sqrt(self.SIZE)
+
+    def test_reproducible_by_its_seed(self, clean):
+        def seen(seed):
+            return SensorNoise(1e-5, 100.0, seed).applied_to(clean)
+
+        np.testing.assert_array_equal(seen(1).position, seen(1).position)
+        np.testing.assert_array_equal(seen(1).pressure, seen(1).pressure)
+        assert not np.array_equal(seen(1).position, seen(2).position)
+
+    def test_a_gap_stays_one(self, clean):
+        noise = SensorNoise(1e-5, 100.0)
+        assert noise.applied_to(dataclasses.replace(clean, gap="gap of 1 s")).gap == "gap of 1 s"
+        assert noise.applied_to(clean).gap == ""
+
+    def test_each_sensor_by_itself(self, clean):
+        """The noise of one sensor does not depend on whether the other has any."""
+        both = SensorNoise(1e-5, 100.0, 1).applied_to(clean)
+        one = SensorNoise(position=1e-5, seed=1).applied_to(clean)
+        np.testing.assert_array_equal(one.position, both.position)
+        np.testing.assert_array_equal(one.pressure, clean.pressure)

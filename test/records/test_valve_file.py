@@ -7,15 +7,20 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The YAML file of a valve: what it may hold, and the key that a refusal names."""
+"""The YAML file of a valve, or of its nodes: what it may hold; and files that are written whole."""
 
 import dataclasses
+import errno
 import math
+import os
+import threading
+from pathlib import Path
 
 import pytest
 
 from valve_friction_ros.identification import FIXABLE
 from valve_friction_ros.model import BENCH_VALVE, LOW_FRICTION, Valve
+from valve_friction_ros.records.files import write_whole
 from valve_friction_ros.records.valve_file import read_valve_file
 
 
@@ -135,3 +140,154 @@ def test_unreadable(tmp_path, write):
     path.write_bytes(b"\xff\xfe\x00")
     with pytest.raises(ValueError, match=r"valve.yaml: cannot be read: 'utf-8' codec"):
         read_valve_file(path)
+
+
+CONFIG = Path(__file__).resolve().parents[2] / "config"
+PLANT = """/**:
+  ros__parameters:
+    diaphragm_area: 0.0445
+    travel: 0.03
+    window: 30.0
+    use_sim_time: false
+/fv_101/identifier:
+  ros__parameters: {travel: 0.04, fixed.mass: 1.7}
+/fv_102:
+  identifier:
+    ros__parameters:
+      fixed: {mass: 1.8}
+  simulator:
+    ros__parameters: {diaphragm_area: 0.1}
+"""
+
+
+@pytest.fixture
+def write_parameters(tmp_path):
+    def write_parameters(text):
+        path = tmp_path / "plant.yaml"
+        path.write_text(text)
+        return path
+
+    return write_parameters
+
+
+@pytest.mark.parametrize("name", ["bench_low", "bench_high", "monitor"])
+def test_the_files_of_the_package(name):
+    found = read_valve_file(CONFIG / f"{name}.yaml")
+    assert found.valve.diaphragm_area == BENCH_VALVE.diaphragm_area
+    assert found.known["mass"] == 1.6
+    assert found.settings.get("position_bias") == (None if name == "monitor" else 0.00113)
+
+
+def test_what_all_share_and_what_is_ones_own(write_parameters):
+    path = write_parameters(PLANT)
+    first, second = (read_valve_file(path, name) for name in ("fv_101", "/fv_102"))
+    assert (first.valve.travel, second.valve.travel) == (0.04, 0.03)
+    assert (first.settings["fixed.mass"], second.settings["fixed.mass"]) == (1.7, 1.8)
+    assert second.valve.diaphragm_area == 0.0445
+    with pytest.raises(ValueError, match=r"fv_101, fv_102\): choose one by --valve-name"):
+        read_valve_file(path)
+
+
+def test_a_misspelled_key(write_parameters):
+    path = write_parameters("/**:\n  ros__parameters: {diaphragm_area: 0.04, warn_ration: 1.2}\n")
+    with pytest.raises(ValueError, match=r"unknown key 'warn_ration'; did you mean 'warn_ratio'\?"):
+        read_valve_file(path)
+
+
+def test_what_stands_for_nothing(write_parameters):
+    path = write_parameters(
+        "diaphragm_area: 0.04\nderivative_window: 0\nfixed: {mass: .nan}\nwindow: 60.0\n"
+    )
+    found = read_valve_file(path)
+    assert dict(found.settings) == {}
+    assert dict(found.known) == {}
+
+
+@pytest.fixture
+def full_disk(monkeypatch):
+    """Half of each file is written, then the disk is full."""
+    written = Path.write_bytes
+
+    def write_half(path, content):
+        written(path, content[: len(content) // 2])
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_bytes", write_half)
+
+
+def names(folder):
+    return {path.name for path in folder.iterdir()}
+
+
+def test_a_new_file_and_one_in_its_place(tmp_path):
+    path = tmp_path / "page.html"
+    for content in (b"first", b"second"):
+        write_whole(path, content)
+        assert path.read_bytes() == content
+    assert names(tmp_path) == {"page.html"}
+
+
+@pytest.mark.usefixtures("full_disk")
+def test_no_part_of_it_stays(tmp_path):
+    path = tmp_path / "picture.png"
+    with pytest.raises(OSError, match="No space left") as raised:
+        write_whole(path, b"content")
+    assert raised.value.filename == str(path)
+    assert names(tmp_path) == set()
+
+
+@pytest.mark.usefixtures("full_disk")
+def test_what_was_there_stays(tmp_path):
+    path = tmp_path / "picture.png"
+    path.touch()
+    with path.open("wb") as stream:
+        stream.write(b"before")
+    with pytest.raises(OSError, match="No space left"):
+        write_whole(path, b"content")
+    assert path.read_bytes() == b"before"
+    assert names(tmp_path) == {"picture.png"}
+
+
+def test_no_folder(tmp_path):
+    path = tmp_path / "none" / "picture.png"
+    with pytest.raises(FileNotFoundError) as raised:
+        write_whole(path, b"content")
+    assert raised.value.filename == str(path)
+
+
+def test_a_link_stays_a_link(tmp_path):
+    (tmp_path / "folder").mkdir()
+    place, link = tmp_path / "folder" / "place.png", tmp_path / "link.png"
+    link.symlink_to(place)
+    write_whole(link, b"content")
+    assert link.is_symlink()
+    assert place.read_bytes() == b"content"
+
+
+def test_a_pipe_is_written_to(tmp_path):
+    path = tmp_path / "pipe.png"
+    os.mkfifo(path)
+    writer = threading.Thread(target=write_whole, args=(path, b"content"))
+    writer.start()
+    assert path.read_bytes() == b"content"
+    writer.join()
+    assert path.is_fifo()
+
+
+def test_a_device_stays():
+    with pytest.raises(OSError, match="No space left"):
+        write_whole(Path("/dev/full"), b"content")
+    assert Path("/dev/full").is_char_device()
+
+
+def test_a_read_only_folder_names_the_file(tmp_path, monkeypatch):
+    """Neither the draft nor its removal is what the user asked for."""
+
+    def refuse(self, *_, **__):
+        raise OSError(errno.EROFS, os.strerror(errno.EROFS), str(self))
+
+    monkeypatch.setattr(Path, "write_bytes", refuse)
+    monkeypatch.setattr(Path, "unlink", refuse)
+    with pytest.raises(OSError, match="Read-only") as error:
+        write_whole(tmp_path / "x.png", b"")
+    assert error.value.filename == str(tmp_path / "x.png")

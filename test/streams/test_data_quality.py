@@ -24,7 +24,6 @@ from valve_friction_ros.streams import (
     DataFault,
     DataQuality,
     FaultKind,
-    Intake,
     Kind,
     LossCounter,
     RecordBuffer,
@@ -263,25 +262,12 @@ def test_the_machine_without_ranges_takes_any_pressure():
     assert bench.run(3.0, pressure=-1e300) == ()
 
 
-def test_an_intake_without_faults():
-    assert Intake().rejected == {}
-
-
 def counted(*looks, period=0.1):
     """The losses after some looks at the stream, `period` s apart."""
     counter, now = LossCounter(), 0.0
     for now, numbers in zip(itertools.count(0.0, period), looks):
         counter.take(numbers, now)
     return counter.losses(now)
-
-
-def test_nothing_is_lost():
-    losses = counted(range(1, 100), [], range(100, 110))
-    assert (losses.lost, losses.share, losses.silence) == (0, 0.0, float("inf"))
-
-
-def test_a_stream_that_is_met_late_has_lost_nothing():
-    assert counted(range(5000, 5100)).lost == 0
 
 
 @given(st.sets(st.integers(1, 400), max_size=300), st.integers(1, 60))

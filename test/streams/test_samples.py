@@ -56,25 +56,6 @@ def test_nanoseconds_are_the_nearest(seconds, expected):
     assert isinstance(nanoseconds(seconds), int)
 
 
-def test_empty():
-    buffer = SampleBuffer(1.0)
-    stamps, values = buffer.samples()
-    assert len(buffer) == stamps.size == values.size == 0
-    assert buffer.last_stamp is None
-
-
-def test_returns_what_was_put_in():
-    buffer = SampleBuffer(1.0)
-    for step in range(5):
-        buffer.append(START + step, 0.1 * step)
-    stamps, values = buffer.samples()
-    np.testing.assert_array_equal(stamps, START + np.arange(5))
-    np.testing.assert_array_equal(values, 0.1 * np.arange(5))
-    assert stamps.dtype == np.int64
-    assert values.dtype == np.float64
-    assert buffer.last_stamp == START + 4
-
-
 def test_the_window_holds_its_ends():
     """A sample exactly one window old is in; one nanosecond older is out."""
     buffer = SampleBuffer(1.0)
@@ -140,20 +121,6 @@ def test_blocks_are_what_their_samples_are(pauses, repeats, block, window):
     inside = stamps >= stamps[-1] - window
     np.testing.assert_array_equal(buffer.samples().stamps, stamps[inside])
     np.testing.assert_array_equal(buffer.samples().values, values[inside])
-
-
-@pytest.mark.parametrize("period", [1, 4_194_304, 5_000_000, 10**10])
-def test_single_samples_and_blocks_make_the_same(period):
-    """5 ms: a chunk lasts longer than 32 bits of nanoseconds."""
-    stamps = START + period * np.arange(5000)
-    values = np.cos(np.arange(5000.0))
-    whole, single = (SampleBuffer(3000 * period / 1e9) for _ in range(2))
-    whole.extend(Samples(stamps, values))
-    for stamp, value in zip(stamps.tolist(), values.tolist(), strict=True):
-        single.append(stamp, value)
-    for buffer in (whole, single):
-        np.testing.assert_array_equal(buffer.samples().stamps, stamps[-3001:])
-        np.testing.assert_array_equal(buffer.samples().values, values[-3001:])
 
 
 def test_even_stamps_take_no_memory():
@@ -267,9 +234,6 @@ class TestTables:
     def test_nanoseconds_of_small_times_come_back(self, nanoseconds):
         seconds = np.array([value / 1e9 for value in nanoseconds])
         assert rows_arrived(table(seconds)).stamps[::2].tolist() == nanoseconds
-
-    def test_none_is_none(self):
-        assert rows_arrived(np.empty((0, 3))).stamps.size == 0
 
     @pytest.mark.parametrize(
         ("shape", "told"),
@@ -434,13 +398,6 @@ class TestUnevenStamps:
         np.testing.assert_array_equal(at_once.position, later.position)
         assert later.start_time == float(stamps[0] + 7 + shift) / 1e9
 
-    def test_the_first_and_last_samples_stay(self):
-        """Stamps at 0, 1, 2, 4, 5 ms: the grid of 1 ms fills the missing one in."""
-        stamps = START + MILLISECOND * np.array([0, 1, 2, 4, 5])
-        stem = Samples(stamps, np.array([0.0, 1.0, 2.0, 8.0, 16.0]))
-        record = uniform_recording(signal(every(1, 6), pressure), stem)
-        np.testing.assert_array_equal(record.position, [0, 1, 2, 5, 8, 16])
-
 
 class TestGaps:
     def with_pause(self, periods):
@@ -477,12 +434,6 @@ class TestGaps:
         assert len(record) == 38
         np.testing.assert_array_equal(record.stamped.position.time, (stamps - START) / 1e9)
         np.testing.assert_array_equal(record.stamped.drive.value, record.pressure)
-
-    def test_both_signals_have_one(self):
-        """That of the pressure is named."""
-        cut = self.with_pause(11)
-        record = uniform_recording(signal(cut, pressure), signal(cut, position))
-        assert record.gap.startswith("gap of 0.011 s in actuator_pressure")
 
     @pytest.mark.parametrize("gappy", ["actuator_pressure", "stem_state"])
     @pytest.mark.parametrize("pauses", [1, 3])
@@ -580,8 +531,3 @@ class TestTooLittle:
             with pytest.raises(RefusalError) as refusal:
                 uniform_recording(*signals)
             assert str(refusal.value) == message
-
-    def test_names_of_the_caller(self):
-        nothing = signal([], pressure)
-        with pytest.raises(RefusalError, match=r"^no samples of force_n"):
-            uniform_recording(nothing, nothing, ("force_n", "position_m"))

@@ -109,12 +109,6 @@ def test_what_the_result_keeps(result, record, estimate):
     assert result.estimate.values == estimate.values
 
 
-def test_default_settings_are_the_paper_s(record):
-    result = identify_published(record, BENCH_VALVE)
-    assert result.settings == IdentificationSettings()
-    assert result.derivative_window == 31
-
-
 def test_fit_is_the_share_of_the_force(result, record, estimate):
     """1 − |residual|/|force − mean| of the force less mass and spring, above the threshold."""
     velocity, acceleration, margin = differentiate(record.position, 1e-3, 33)
@@ -242,15 +236,6 @@ class TestStaticFriction:
         assert warning == (
             "the record shows no breakaway from rest: static_friction is set to coulomb_friction"
         )
-
-
-def test_an_assumed_mass(bench_record):
-    """The reason in brackets is tested with the mass."""
-    settings = IdentificationSettings(assumed_mass=1 / 3)
-    estimate = published_estimate(bench_record("low", SquareWave(), 20.8), BENCH_VALVE, settings)
-    (warning,) = estimate.warnings
-    assert warning.startswith("the record does not determine the mass (")
-    assert warning.endswith("): 0.333333 kg is assumed")
 
 
 def test_negative_values_but_for_a_preload(bench_record):

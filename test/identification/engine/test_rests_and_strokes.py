@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Friction by whole strokes: a stem that jumps between two samples."""
+"""F_s by the forces at which the stem leaves its rests; friction by whole strokes of jumps."""
 
 from dataclasses import replace
 
@@ -18,19 +18,126 @@ from hypothesis import strategies as st
 
 from valve_friction_ros.identification.engine import friction_curve
 from valve_friction_ros.identification.engine.balance_regression import LagPrior
+from valve_friction_ros.identification.engine.departures import static_friction
 from valve_friction_ros.identification.engine.friction_curve import (
     _by_strokes,
     _cut,
     curve_numbers,
     friction_curves,
 )
+from valve_friction_ros.identification.engine.intervals import Budget, Estimated
 from valve_friction_ros.identification.engine.sliding_averages import MeasuredSignal
-from valve_friction_ros.model import Valve
+from valve_friction_ros.model import KarnoppParameters, Valve, simulate
 from valve_friction_ros.model.recording import StampedRecord, StampedSignal
 
-PERIOD = 0.01
-TIME = np.arange(6000) * PERIOD
-NO_LAG = LagPrior(0.0)
+PERIOD = 2e-3
+TIME = np.arange(30_000) * PERIOD
+USUAL, NO_LAG = LagPrior(), LagPrior(0.0)
+
+
+def estimated(value, share):
+    return Estimated(value, share * value, Budget(share * value / 2, 0.0, {}))
+
+
+def drawn_valve(seed, slips=True):
+    """Draw a valve from the smallest to the largest, and a packing in proportion to it."""
+    generator = np.random.default_rng(seed)
+    area, spring, travel, dry, ratio, stribeck = np.exp(
+        generator.uniform(
+            *np.log([[4e-3, 2e4, 8e-3, 0.02, 1.25, 0.5e-3], [0.12, 2e6, 0.08, 0.2, 2.0, 3e-3]])
+        )
+    )
+    dry, preload = dry * spring * travel, 0.3 * spring * travel
+    packing = KarnoppParameters(
+        40 * area,
+        0.02 * spring,
+        dry,
+        ratio * dry if slips else dry,
+        spring,
+        preload,
+        stribeck_velocity=stribeck if slips else 0.0,
+    )
+    return Valve(area, 41_740.0, travel), packing
+
+
+def loaded(valve, packing, seed, late=0.0):
+    """Load and unload the stem by a slow sweep with noise; it slips and sticks on its way."""
+    spring, travel = packing.spring_constant, valve.travel
+    middle = packing.spring_preload + 0.5 * spring * travel
+    swing = 0.25 * spring * travel + packing.static_friction
+    generator = np.random.default_rng(seed)
+    force = middle + swing * np.sin(2 * np.pi * TIME / generator.uniform(12.0, 20.0))
+    pressure = valve.pressure_reference + force / valve.diaphragm_area
+    position = simulate(valve, packing, pressure, PERIOD).position
+    noises = generator.standard_normal((2, TIME.size))
+    drive = pressure + 3e-4 * np.ptp(pressure) * noises[0]
+    stem = position + 2e-4 * travel * noises[1]
+    return StampedRecord(StampedSignal(TIME, drive), StampedSignal(TIME + late, stem))
+
+
+def spring_of(packing, share=0.03):
+    names = ("spring_constant", "spring_preload")
+    return {name: estimated(getattr(packing, name), share) for name in names}
+
+
+@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("late", [0.0, 0.02])
+def test_a_stem_that_slips_shows_its_static_friction(seed, late):
+    valve, packing = drawn_valve(seed)
+    found = static_friction(loaded(valve, packing, seed, late), valve, spring_of(packing), USUAL)
+    one, true = found.static_friction, packing.static_friction
+    assert found.departures >= 4
+    assert abs(one.value - true) <= one.half_width
+    assert one.half_width < 0.25 * true
+
+
+def test_the_departures_alone_determine_the_spring_well_enough():
+    valve, packing = drawn_valve(3)
+    record = loaded(valve, packing, 3)
+    one = static_friction(record, valve, {}, NO_LAG).static_friction
+    assert abs(one.value - packing.static_friction) <= one.half_width < packing.static_friction
+
+
+def test_a_spring_that_the_departures_contradict_is_not_believed():
+    valve, packing = drawn_valve(3)
+    wrong = {
+        "spring_constant": estimated(2.0 * packing.spring_constant, 0.01),
+        "spring_preload": estimated(0.3 * packing.spring_preload, 0.01),
+    }
+    one = static_friction(loaded(valve, packing, 3), valve, wrong, NO_LAG).static_friction
+    assert abs(one.value - packing.static_friction) <= one.half_width
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_without_a_slip_there_is_no_static_friction_of_its_own(seed):
+    valve, packing = drawn_valve(seed, slips=False)
+    assert static_friction(loaded(valve, packing, seed), valve, spring_of(packing), USUAL) is None
+
+
+def test_few_departures_say_nothing():
+    valve, packing = drawn_valve(3)
+    record = loaded(valve, packing, 3)
+    kept = record.drive.time < 4.0
+    short = StampedRecord(
+        *(StampedSignal(one.time[kept], one.value[kept]) for one in (record.drive, record.position))
+    )
+    assert static_friction(short, valve, spring_of(packing), USUAL) is None
+
+
+def test_an_unstated_lag_widens_what_was_loaded_quickly():
+    valve, packing = drawn_valve(5)
+    record = loaded(valve, packing, 5)
+    usual, known = (
+        static_friction(record, valve, spring_of(packing), lag).static_friction
+        for lag in (USUAL, NO_LAG)
+    )
+    assert known.budget.timing == pytest.approx(0.0, abs=1e-6 * known.value)
+    assert usual.budget.timing > 0
+    assert usual.budget.shared == usual.budget.timing
+
+
+JUMP_PERIOD = 0.01
+JUMP_TIME = np.arange(6000) * JUMP_PERIOD
 SLIDING = "sliding_friction"
 VALVE = Valve(0.04, 40e3, 0.03)
 FRICTION, SPRING, PRELOAD = 80.0, 1e5, 400.0
@@ -44,20 +151,20 @@ def jumping(jumps=8, rest=2.0, size=0.3e-3, uneven=0.0, noise=(0.0, 0.0), seed=0
     random = np.random.default_rng(seed)
     sizes = size * (1.0 + uneven * random.uniform(-1.0, 1.0, jumps))
     places = np.concatenate([[0.01], 0.01 + np.cumsum(sizes * np.resize([1.0, -1.0], jumps))])
-    at = np.clip((TIME / rest).astype(int), 0, jumps)
+    at = np.clip((JUMP_TIME / rest).astype(int), 0, jumps)
     stem = places[at]
     middles, sides = 0.5 * (places[1:] + places[:-1]), np.resize([1.0, -1.0], jumps)
     pushed = PRELOAD + SPRING * middles + FRICTION * sides
-    force = np.interp(TIME, rest * np.arange(1, jumps + 1), pushed)
-    white = random.standard_normal((2, TIME.size))
+    force = np.interp(JUMP_TIME, rest * np.arange(1, jumps + 1), pushed)
+    white = random.standard_normal((2, JUMP_TIME.size))
     return force + noise[0] * white[0], stem + noise[1] * white[1]
 
 
 def forces(force, stem, lag=NO_LAG, noise=(0.0, 0.0)):
     """Regress both."""
     return _by_strokes(
-        MeasuredSignal(TIME, force, noise[0], PERIOD),
-        MeasuredSignal(TIME, stem, noise[1], PERIOD),
+        MeasuredSignal(JUMP_TIME, force, noise[0], JUMP_PERIOD),
+        MeasuredSignal(JUMP_TIME, stem, noise[1], JUMP_PERIOD),
         VALVE,
         lag,
     )
@@ -91,7 +198,7 @@ def test_a_force_that_jumps_with_the_stem_leaves_open_what_it_was_between():
     force, stem = jumping(12)
     held = np.flatnonzero(np.diff(stem) != 0.0)
     force = np.concatenate([np.repeat(force[held], np.diff(held, prepend=-1)),
-                            np.full(TIME.size - held[-1] - 1, force[held[-1]])])  # fmt: skip
+                            np.full(JUMP_TIME.size - held[-1] - 1, force[held[-1]])])  # fmt: skip
     assert np.max(np.abs(np.diff(force))) > 1.9 * FRICTION
     found = forces(force, stem).numbers[SLIDING]
     assert found.half_width > 0.5 * FRICTION
@@ -101,20 +208,20 @@ def test_a_force_that_knows_nothing_of_the_stem_is_no_friction():
     """In 20 walks the interval is wider than a third of what it holds, or holds no friction."""
     _, stem = jumping(12, uneven=0.3)
     for seed in range(20):
-        walk = np.cumsum(np.random.default_rng(seed).standard_normal(TIME.size))
+        walk = np.cumsum(np.random.default_rng(seed).standard_normal(JUMP_TIME.size))
         one = forces(1e3 * walk / np.ptp(walk), stem).numbers[SLIDING]
         assert one.value < 3.0 * one.half_width, seed
 
 
 def test_one_way_has_no_friction():
     assert forces(*jumping(1)) is None
-    assert forces(np.ones_like(TIME), np.full_like(TIME, 0.01)) is None
+    assert forces(np.ones_like(JUMP_TIME), np.full_like(JUMP_TIME, 0.01)) is None
 
 
 def test_few_strokes_are_cut_into_pieces():
     """Two slow strokes have eight pieces of equal length, whose scatter is seen."""
-    place = 0.01 + 0.002 * np.interp(TIME, [10.0, 25.0, 40.0], [0.0, 1.0, 0.0])
-    side = np.where(TIME < 25.0, 1.0, -1.0)
+    place = 0.01 + 0.002 * np.interp(JUMP_TIME, [10.0, 25.0, 40.0], [0.0, 1.0, 0.0])
+    side = np.where(JUMP_TIME < 25.0, 1.0, -1.0)
     found = forces(PRELOAD + SPRING * place + FRICTION * side, place)
     assert found.speed.size == 8
     assert found.numbers[SLIDING].value == pytest.approx(FRICTION, rel=0.02)
@@ -134,7 +241,7 @@ def test_pieces_are_of_equal_length(ways, pieces):
 def test_where_no_stem_slides_the_sliding_friction_is_that_of_the_strokes():
     force, stem = jumping(12, uneven=0.3, noise=(1.0, 1e-6))
     pressure = VALVE.pressure_reference + force / VALVE.diaphragm_area
-    record = StampedRecord(StampedSignal(TIME, pressure), StampedSignal(TIME, stem))
+    record = StampedRecord(StampedSignal(JUMP_TIME, pressure), StampedSignal(JUMP_TIME, stem))
     (curve,) = friction_curves(record, VALVE)
     assert curve.numbers.keys() == {SLIDING}
     one = curve_numbers([curve])[SLIDING]

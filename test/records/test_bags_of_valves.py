@@ -7,25 +7,121 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""A buffer written as a bag: nothing lost, nothing half done."""
+"""Bags: which topics are a valve's, what is written, and what is used of rosbags for it."""
 
+import inspect
 import os
 import subprocess
 import sys
+from importlib import import_module
+from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
 import pytest
-from bags import stamps_of
+from bags import messages_of, stamps_of, storage_file
+from bags import write_bag as write_messages
 from rosbags.rosbag2 import Reader
 
 from valve_friction_ros.identification import RefusalError
-from valve_friction_ros.model import BENCH_VALVE, GRAPHITE_VALVE, Valve
-from valve_friction_ros.records.bags.topics import StreamNames, TopicChoice
+from valve_friction_ros.model import BENCH_VALVE, GRAPHITE_VALVE, Recording, Valve
+from valve_friction_ros.records.bags.topics import (
+    PRESSURE_TYPE,
+    STEM_TYPE,
+    StreamNames,
+    Topic,
+    TopicChoice,
+    valves_in,
+)
 from valve_friction_ros.records.bags.writing import VALVE_FILE, write_bag
 from valve_friction_ros.records.recordings import ReadingOptions, read_recordings
 from valve_friction_ros.records.valve_file import read_valve_file
 from valve_friction_ros.streams import RecordBuffer
+
+
+def topics(pressures, stems):
+    return [
+        *(Topic(name, PRESSURE_TYPE) for name in pressures),
+        *(Topic(name, STEM_TYPE) for name in stems),
+        Topic("/rosout", "rcl_interfaces/msg/Log"),
+    ]
+
+
+def found(pressures, stems, **choice):
+    return [tuple(valve) for valve in valves_in(topics(pressures, stems), TopicChoice(**choice))]
+
+
+@pytest.mark.parametrize(
+    ("pressure", "stem", "name"),
+    [
+        ("/fv/actuator_pressure", "/fv/stem_state", "/fv"),
+        ("/p", "/x", "/"),
+        ("/a/b/p", "/a/b/x", "/a/b"),
+        ("/plant/pressures/fv", "/plant/stems/fv", "/plant"),
+        ("/plant/fv/p", "/joint_states", "/"),
+    ],
+)
+def test_one_of_each_is_a_valve_wherever_they_are(pressure, stem, name):
+    assert found([pressure], [stem]) == [(name, pressure, stem)]
+
+
+def test_one_of_each_in_a_namespace():
+    assert found(["/b/p", "/a/p"], ["/a/x", "/b/y"]) == [
+        ("/a", "/a/p", "/a/x"),
+        ("/b", "/b/p", "/b/y"),
+    ]
+
+
+def test_the_names_of_this_package_go_first():
+    pressures = ["/a/supply", "/a/actuator_pressure", "/b/actuator_pressure"]
+    assert found(pressures, ["/a/stem_state", "/a/arm", "/b/stem_state"]) == [
+        ("/a", "/a/actuator_pressure", "/a/stem_state"),
+        ("/b", "/b/actuator_pressure", "/b/stem_state"),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("pressures", "stems", "option"),
+    [
+        (["/a/supply", "/a/chamber"], ["/a/x"], "--pressure-topic"),
+        (["/a/p"], ["/a/x", "/a/y"], "--stem-topic"),
+        (["/a/p", "/b/p"], ["/a/x", "/a/y", "/b/x"], "--stem-topic"),
+    ],
+)
+def test_several_are_named_and_not_guessed_among(pressures, stems, option):
+    with pytest.raises(ValueError, match=f": choose one by {option}$"):
+        found(pressures, stems)
+
+
+def test_half_a_valve_is_told_by_its_name():
+    assert found(
+        ["/a/p", "/b/actuator_pressure", "/weather/air"], ["/a/x", "/arm/joint_states"]
+    ) == [
+        ("/a", "/a/p", "/a/x"),
+        ("/b", "/b/actuator_pressure", None),
+    ]
+
+
+def test_no_pair_at_all():
+    with pytest.raises(ValueError, match="no namespace holds both a pressure and a stem, of /a/p"):
+        found(["/a/p", "/b/p"], ["/joint_states"])
+    chosen = found(["/a/p", "/b/p"], ["/joint_states"], pressure="/b/p")
+    assert chosen == [("/", "/b/p", "/joint_states")]
+
+
+def test_names_within_each_namespace():
+    pressures = ["/a/io/p", "/a/p", "/b/io/p"]
+    assert found(pressures, ["/a/x", "/b/x"], pressure="io/p") == [
+        ("/a", "/a/io/p", "/a/x"),
+        ("/b", "/b/io/p", "/b/x"),
+    ]
+
+
+def test_many_topics_are_not_all_listed():
+    many = [Topic(f"/t{number:02}", "std_msgs/msg/Float64") for number in range(15)]
+    with pytest.raises(ValueError, match=r"/t11 \(std_msgs/msg/Float64\) and 3 more: record"):
+        valves_in(many, TopicChoice())
+
 
 NAMES = StreamNames("/fv_101/actuator_pressure", "/plant/stems", "plug")
 
@@ -160,3 +256,65 @@ def test_a_file_that_may_not_grow(tmp_path):
     )
     assert (done.stdout, done.stderr) == ("File too large\n", "")
     assert list(tmp_path.iterdir()) == []
+
+
+PACKAGE = Path(__file__).parents[2] / "valve_friction_ros"
+HOME = PACKAGE / "records" / "bags" / "rosbags_internals.py"
+
+
+def moved(what):
+    pytest.fail(f"rosbags {version('rosbags')} has no {what} any more: mend {HOME.name}")
+
+
+@pytest.fixture(scope="module")
+def reader():
+    try:
+        return import_module("rosbags.rosbag2.storage_mcap").McapReader
+    except (ImportError, AttributeError):
+        moved("rosbags.rosbag2.storage_mcap.McapReader")
+
+
+@pytest.mark.parametrize("name", ["messages", "messages_scan"])
+def test_messages_of_connections(reader, name):
+    method = getattr(reader, name, None) or moved(f"McapReader.{name}")
+    if [*inspect.signature(method).parameters][:2] != ["self", "connections"]:
+        moved(f"McapReader.{name}(connections)")
+
+
+def test_chunks_tell_of_an_index(reader, tmp_path):
+    record = Recording(1e-3, [1e5, 1.1e5], [0.01, 0.02])
+    opened = reader(storage_file(write_messages(tmp_path / "bag", messages_of(record))))
+    opened.open()
+    try:
+        if not all(getattr(chunk, "channel_count", None) for chunk in opened.chunks or [None]):
+            moved("McapReader.chunks with a channel_count each")
+    finally:
+        opened.close()
+
+
+def test_decoders_return_where_they_stopped():
+    typesys = import_module("rosbags.typesys")
+    types, kind = typesys.get_typestore(typesys.Stores.ROS2_JAZZY), "std_msgs/msg/Float64"
+    data = bytes(types.serialize_cdr(types.types[kind](data=2.5), kind))[4:]
+    try:
+        definition = types.get_msgdef(kind)
+        message, end = definition.deserialize_cdr_le(data + b"more", 0, definition.cls, types)
+        assert definition.deserialize_cdr_be
+    except (AttributeError, TypeError):
+        moved("Typestore.get_msgdef with deserialize_cdr_le, deserialize_cdr_be and cls")
+    assert (message.data, end) == (2.5, 8)
+
+
+def test_the_version_it_was_checked_with_is_the_pinned_one():
+    pinned = (PACKAGE.parent / "requirements" / "run.txt").read_text()
+    checked = HOME.read_text().partition("Checked with rosbags ")[2].partition(";")[0]
+    assert f"rosbags=={checked}\n" in pinned
+
+
+def test_nothing_else_imports_undocumented_modules():
+    documented = {"rosbags.rosbag2", "rosbags.serde", "rosbags.typesys"}
+    for path in PACKAGE.rglob("*.py"):
+        for line in path.read_text().splitlines():
+            module = line.removeprefix("from ").partition(" import ")[0]
+            if line.startswith("from rosbags") and path != HOME:
+                assert module in documented, f"{path}: {line}"
