@@ -18,6 +18,7 @@ import pytest
 from histories import VALVE
 from service import SECOND, START, made_moves
 from service import VALVE as BUILT
+from waiting import PATIENCE, wait_until
 
 from valve_friction_ros.evidence import Move
 from valve_friction_ros.health import FrictionMonitor, MonitorSettings
@@ -139,7 +140,6 @@ def test_a_recording_that_is_played_costs_no_kept_move(tmp_path):
     assert "a recording that is played" in bench.ledger.problem
 
 
-PATIENCE = 60.0
 EXACT = IdentificationSettings(timing_uncertainty=0.005)
 
 
@@ -210,9 +210,7 @@ def test_a_packing_that_is_renewed_meanwhile_has_no_baseline(bench):
 
 def settled(bench):
     """Show the values once the thread has nothing to do."""
-    deadline = time.monotonic() + PATIENCE
-    while bench.worker.is_busy and time.monotonic() < deadline:
-        time.sleep(0.01)
+    wait_until(lambda: not bench.worker.is_busy)
     return bench.watch.values()
 
 
