@@ -26,6 +26,7 @@ import pytest
 from browser import axe_violations, chromium
 from local_server import certificate_pair, free_port
 from quick_accounts import PASSWORD, quick_account
+from waiting import PATIENCE, wait_until
 
 from valve_friction_ros.dashboard.accounts import VARIABLE, Access, Role
 from valve_friction_ros.dashboard.log_in import Sessions
@@ -39,16 +40,10 @@ from starlette.responses import PlainTextResponse
 from valve_friction_ros.dashboard.gate import Gate
 from valve_friction_ros.dashboard.pages.server import LightlyPacked
 
-PATIENCE = 60.0
 URL = "http://127.0.0.1:8080"
 SCRIPT = Path(__file__).parents[1] / "support" / "guarded_page.py"
 ACCOUNTS = f"{quick_account('anna')};{quick_account('bo', Role.VIEW)}"
 POLLING = "/_nicegui_ws/socket.io/?EIO=4&transport=polling"
-
-
-def is_open(port):
-    with socket.socket() as tried:
-        return tried.connect_ex(("127.0.0.1", port)) == 0
 
 
 @contextmanager
@@ -67,11 +62,13 @@ def served(folder, *arguments, accounts=""):
             stderr=subprocess.STDOUT,
         )
     try:
-        deadline = time.monotonic() + PATIENCE
-        while not is_open(port):
+
+        def is_open():
             assert process.poll() is None, output.read_text()
-            assert time.monotonic() < deadline, output.read_text()
-            time.sleep(0.05)
+            with socket.socket() as tried:
+                return tried.connect_ex(("127.0.0.1", port)) == 0
+
+        wait_until(is_open, output.read_text)
         yield port
         process.send_signal(signal.SIGINT)
         process.wait(timeout=PATIENCE)
