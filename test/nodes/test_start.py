@@ -254,7 +254,7 @@ def test_diagnostics_say_that_it_prepares(live, tmp_path):
     (tmp_path / "prepared").touch()
     status = live.client.next_status(lambda one: "preparing" not in values_of(one), "its end")
     assert "preparing" not in status.message
-    assert "ready: " in process.errors
+    live.client.wait_until(lambda: "ready: " in process.errors, "the ready line")
 
 
 def python(code, *arguments, **environment):
