@@ -21,7 +21,7 @@ from pathlib import Path
 
 import pytest
 from local_server import free_port
-from waiting import wait_until
+from waiting import PATIENCE, wait_until
 
 pytest.importorskip("nicegui", reason="NiceGUI is not installed")
 
@@ -36,7 +36,6 @@ from valve_friction_ros.dashboard.gate import (
     ConnectionLog,
 )
 
-PATIENCE = 60.0
 SCRIPT = Path(__file__).parents[1] / "support" / "guarded_page.py"
 FILES = 1024
 """Files that the server may open: the usual limit of a shell."""

@@ -13,7 +13,6 @@ import asyncio
 import json
 import os
 import re
-import shutil
 import signal
 import socket
 import ssl
@@ -24,24 +23,27 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 
 import pytest
-from browser import Tab, axe_violations, chromium
+from browser import axe_violations, chromium
 from local_server import certificate_pair, free_port
 from quick_accounts import PASSWORD, quick_account
+from waiting import PATIENCE, wait_until
 
-from valve_friction_ros.dashboard.accounts import VARIABLE, Role
+from valve_friction_ros.dashboard.accounts import VARIABLE, Access, Role
+from valve_friction_ros.dashboard.log_in import Sessions
 
-httpx = pytest.importorskip("httpx", reason="run `make venv-dashboard`")
+pytest.importorskip("httpx", reason="run `make venv-dashboard`")
 pytest.importorskip("nicegui", reason="run `make venv-dashboard`")
 
-PATIENCE = 60.0
+import httpx
+from starlette.responses import PlainTextResponse
+
+from valve_friction_ros.dashboard.gate import Gate
+from valve_friction_ros.dashboard.pages.server import LightlyPacked
+
+URL = "http://127.0.0.1:8080"
 SCRIPT = Path(__file__).parents[1] / "support" / "guarded_page.py"
 ACCOUNTS = f"{quick_account('anna')};{quick_account('bo', Role.VIEW)}"
 POLLING = "/_nicegui_ws/socket.io/?EIO=4&transport=polling"
-
-
-def is_open(port):
-    with socket.socket() as tried:
-        return tried.connect_ex(("127.0.0.1", port)) == 0
 
 
 @contextmanager
@@ -60,11 +62,13 @@ def served(folder, *arguments, accounts=""):
             stderr=subprocess.STDOUT,
         )
     try:
-        deadline = time.monotonic() + PATIENCE
-        while not is_open(port):
+
+        def is_open():
             assert process.poll() is None, output.read_text()
-            assert time.monotonic() < deadline, output.read_text()
-            time.sleep(0.05)
+            with socket.socket() as tried:
+                return tried.connect_ex(("127.0.0.1", port)) == 0
+
+        wait_until(is_open, output.read_text)
         yield port
         process.send_signal(signal.SIGINT)
         process.wait(timeout=PATIENCE)
@@ -105,13 +109,41 @@ def operations(url):
         return client.get("/operations").json()
 
 
-class TestWithoutSession:
-    def test_axe_finds_nothing_wrong_with_the_log_in(self, private):
-        with chromium() as browser, closing(Tab(browser, private, width=390)) as tab:
-            page = tab.open("/")
-            page.get_by_label("Password").wait_for()
-            assert axe_violations(page) == []
+def test_refused_log_ins_are_logged_within_a_bound():
+    account, lines = quick_account(), []
+    gate = Gate(
+        None, Access(accounts=(account,)), Sessions([account], 60.0, lambda: 0.0), lines.append
+    )
 
+    async def visit():
+        async with httpx.AsyncClient(transport=httpx.ASGITransport(gate), base_url=URL) as client:
+            form = {"name": "anna\nroot has logged in" + "x" * 500, "password": "wrong"}
+            return [(await client.post("/login", data=form)).status_code for _ in range(80)]
+
+    assert asyncio.run(visit()) == [401] * 10 + [429] * 70
+    assert len(lines) == 60
+    assert "wrong name or password" in lines[0]
+    assert "too many attempts" in lines[10]
+    assert all(line.isprintable() and len(line) < 200 for line in lines)
+    assert lines[0].startswith("refused log-in of ")
+
+
+@pytest.mark.parametrize(
+    ("path", "encoding"), [("/", "gzip"), ("/files/bags/a.mcap", None), ("/filesystem", "gzip")]
+)
+def test_reports_and_bags_are_not_compressed(path, encoding):
+    packed = LightlyPacked(PlainTextResponse("a" * 5000))
+
+    async def visit():
+        async with httpx.AsyncClient(transport=httpx.ASGITransport(packed), base_url=URL) as client:
+            return await client.get(path)
+
+    answer = asyncio.run(visit())
+    assert answer.headers.get("content-encoding") == encoding
+    assert answer.text == "a" * 5000
+
+
+class TestWithoutSession:
     def test_a_page_leads_to_the_log_in_and_back(self, private):
         answer = visitor(private).get("/valve?node=/fv_101&zone=UTC")
         assert answer.status_code == 303
@@ -414,21 +446,9 @@ def test_tries_are_bounded(encrypted):
         assert re.search("try again in 1[45] min", answer.text)
 
 
-@pytest.fixture(scope="module")
-def browser():
-    playwright = pytest.importorskip("playwright.sync_api", reason="run `make venv-test`")
-    chromium = shutil.which("chromium")
-    if chromium is None:
-        pytest.skip("Chromium is not installed: run `make browser`")
-    with playwright.sync_playwright() as driver:
-        running = driver.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
-        yield running
-        running.close()
-
-
-def test_log_in_and_out_in_a_browser(private, browser):
+def log_in_and_out(private, browser):
     """The browser's own rules are kept: no violation of the policy, no request to another host."""
-    page = browser.new_context().new_page()
+    page = browser.new_page(viewport={"width": 390, "height": 900})
     page.set_default_timeout(PATIENCE * 1000)
     said, asked = [], []
     page.on("console", lambda message: said.append(message.text))
@@ -437,6 +457,7 @@ def test_log_in_and_out_in_a_browser(private, browser):
     page.goto(f"{private}/?zone=UTC")
     assert page.url.startswith(f"{private}/login")
     page.get_by_label("Name").fill("anna")
+    assert axe_violations(page) == []
     page.get_by_label("Password").fill("not " + PASSWORD)
     page.keyboard.press("Enter")
     page.get_by_role("alert").wait_for()
@@ -455,3 +476,8 @@ def test_log_in_and_out_in_a_browser(private, browser):
     assert all(url.startswith((private, private.replace("http", "ws"), "data:")) for url in asked)
     assert not [line for line in said if "Content Security Policy" in line], said
     assert not [line for line in said if "Error" in line and "401" not in line], said
+
+
+def test_log_in_and_out_in_a_browser(private):
+    with chromium() as browser:
+        log_in_and_out(private, browser)

@@ -16,8 +16,8 @@ import time
 from pathlib import Path
 
 import numpy as np
-import pageless_identifier
 import pytest
+from faulty_identifier import faulty
 from histories import START as DAWN
 from histories import VALVE, success
 from live_nodes import NAMESPACE, PROJECT, SECOND, START, values_of
@@ -102,16 +102,19 @@ def samples_in(bag):
         return reader.message_count
 
 
-def test_an_alarm_is_recorded(live, tmp_path):
-    baseline_set(live, {"alarm_recording": 3.0})
+def test_an_alarm_is_recorded_and_the_whole_takes_the_place_of_its_first_part(live, tmp_path):
+    baseline_set(live, {"alarm_recording": 10.0, "alarm_recordings": 1})
     client = live.client
     message = client.identified(TIGHT)
     assert client.statuses[-1][1].level == ERROR
+    folder = tmp_path / "valve_friction_ros" / "alarms"
+    client.wait_until(lambda: [*folder.glob("alarm_*")], "the first part")
     assert "alarm_recording" not in client.last_values()  # what comes after is awaited
-    after = START + 5 * SECOND
-    client.send_record(TIGHT, after)
+    client.send_record(TIGHT, START + 5 * SECOND)
     path = recorded(client)
-    assert path.parent == tmp_path / "valve_friction_ros" / "alarms"
+    assert path.parent == folder
+    assert names(folder) == [path.name]
+    assert samples_in(path) == 4 * len(TIGHT)
     assert path.name.startswith("alarm_fv_101_")
     assert path.name.endswith("_ERROR")
     values = client.last_values()
@@ -160,20 +163,6 @@ def test_what_was_before_an_alarm_outlives_a_kill(live, tmp_path):
     assert values["alarm_recording level"] == "ERROR"
 
 
-def test_the_whole_recording_takes_the_place_of_its_first_part(live, tmp_path):
-    baseline_set(live, {"alarm_recording": 10.0, "alarm_recordings": 1})
-    client, folder = live.client, tmp_path / "valve_friction_ros" / "alarms"
-    client.identified(TIGHT)
-    client.wait_until(lambda: [*folder.glob("alarm_*")], "the first part")
-    assert "alarm_recording" not in client.last_values()
-    client.send_record(TIGHT, START + 5 * SECOND)
-    path = recorded(client)
-    assert names(folder) == [path.name]
-    assert samples_in(path) == 4 * len(TIGHT)
-    history = HistoryFile(tmp_path / "valve_friction_ros" / "history.sqlite")
-    client.wait_until(lambda: len(alarm_recordings(history, NODE)) == 1, "its row")
-
-
 @pytest.fixture
 def small_disk(tmp_path):
     """A disk of 64 kB."""
@@ -186,25 +175,29 @@ def small_disk(tmp_path):
     subprocess.run(["umount", "-l", str(folder)], check=True)
 
 
-def test_a_full_disk_is_told_and_no_torn_bag_stays(live, tmp_path, small_disk):
-    node = baseline_set(live, {"alarm_folder": str(small_disk)})
+@pytest.mark.parametrize("reason", ["No space left on device", "Not a directory"])
+def test_what_cannot_be_written_is_told_and_no_torn_bag_stays(live, tmp_path, reason, request):
+    if reason.startswith("No space"):
+        folder = request.getfixturevalue("small_disk")
+    else:
+        (tmp_path / "file").touch()
+        folder = tmp_path / "file" / "alarms"
+    node = baseline_set(live, {"alarm_folder": str(folder)})
     client = live.client
     client.identified(TIGHT)
-    values = client.status_values(
-        lambda one: "alarm_recording problem" in values_of(one), "the full disk"
-    )
-    assert values["alarm_recording problem"] == (
-        f"the alarm was not recorded: cannot write an alarm's recording into {small_disk}: "
-        "No space left on device"
+    problem = "alarm_recording problem"
+    values = client.status_values(lambda one: problem in values_of(one), "what hinders it")
+    assert values[problem] == (
+        f"the alarm was not recorded: cannot write an alarm's recording into {folder}: {reason}"
     )
     wait_beyond_a_recording(client)
-    assert names(small_disk) == []
+    assert not folder.exists() or names(folder) == []
     assert "alarm_recording" not in client.last_values()
     history = HistoryFile(tmp_path / "valve_friction_ros" / "history.sqlite")
     assert alarm_recordings(history, NODE) == ()
     restarted(live, node, {"alarm_folder": str(tmp_path / "room")})
     assert alarmed(client).parent == tmp_path / "room"
-    assert "alarm_recording problem" not in client.last_values()
+    assert problem not in client.last_values()
 
 
 def test_it_is_named_after_a_restart(live, tmp_path):
@@ -276,41 +269,30 @@ def test_a_level_that_flaps_is_recorded_once(live):
     assert names(path.parent) == [path.name]
 
 
-@pytest.mark.parametrize("switched_off", [{"alarm_recording": 0.0}, {"input_timeout": 0.1}])
-def test_what_is_not_recorded(live, tmp_path, switched_off):
-    """Nothing where it is switched off, and nothing for inputs that are silent."""
-    live.start_identifier({**FAST, **switched_off})
+def test_what_is_not_recorded(live, tmp_path):
+    """Silent inputs, the end of a packing's life, and friction where it is switched off."""
+    node = live.start_identifier({**FAST, "reversal_limit": 1.0})
     client = live.client
+    turns = np.tile(np.linspace(0.0, BENCH_VALVE.travel, 64), 16)
+    client.send(position=(START + SECOND * np.arange(turns.size), turns))
+    client.next_status(lambda one: "packing life" in one.message, "the limit")
+    assert client.set_together(NODE, {"input_timeout": 0.1}).successful
+    client.next_status(lambda one: "no data on" in one.message, "silent inputs")
+    wait_beyond_a_recording(client)
+    assert "alarm_recording" not in client.last_values()
+    restarted(live, node, {"alarm_recording": 0.0})
     client.identified(HEALTHY)
+    assert client.set_together(NODE, {"baseline_in_alarm": True}).successful
     assert client.trigger("set_baseline").success
-    if "alarm_recording" in switched_off:
-        client.identified(TIGHT)
-    else:
-        client.next_status(lambda one: one.level == b"\x01", "silent inputs")
+    client.identified(TIGHT)
+    assert client.statuses[-1][1].level == ERROR
     wait_beyond_a_recording(client)
     assert "alarm_recording" not in client.last_values()
     assert not (tmp_path / "valve_friction_ros" / "alarms").exists()
 
 
-def test_what_cannot_be_written_is_told_and_the_node_goes_on(live, tmp_path):
-    (tmp_path / "file").touch()
-    node = baseline_set(live, {"alarm_folder": str(tmp_path / "file" / "alarms")})
-    client = live.client
-    client.identified(TIGHT)
-    values = client.status_values(
-        lambda one: "alarm_recording problem" in values_of(one), "what hindered it"
-    )
-    assert values["alarm_recording problem"] == (
-        "the alarm was not recorded: cannot write an alarm's recording into "
-        f"{tmp_path / 'file' / 'alarms'}: Not a directory"
-    )
-    restarted(live, node, {"alarm_folder": str(tmp_path / "alarms")})
-    assert alarmed(client).parent == tmp_path / "alarms"
-    assert "alarm_recording problem" not in client.last_values()
-
-
 def test_a_fault_in_the_page_is_told_as_that_and_the_bag_is_there(live):
-    baseline_set(live, {}, script=pageless_identifier.SCRIPT).forgive_tracebacks()
+    baseline_set(live, {}, script=faulty("pageless")).forgive_tracebacks()
     client = live.client
     client.identified(TIGHT)
     values = client.status_values(
@@ -319,15 +301,3 @@ def test_a_fault_in_the_page_is_told_as_that_and_the_bag_is_there(live):
     problem = values["alarm_recording problem"]
     assert problem.startswith("the page was not written: internal error: ZeroDivisionError")
     assert (Path(values["alarm_recording"]) / "metadata.yaml").exists()
-
-
-def test_the_life_of_a_packing_makes_no_recording(live, tmp_path):
-    """It rises after months of use, and no samples show it."""
-    live.start_identifier({**FAST, "reversal_limit": 1.0})
-    client = live.client
-    turns = np.tile(np.linspace(0.0, BENCH_VALVE.travel, 64), 16)
-    client.send(position=(START + SECOND * np.arange(turns.size), turns))
-    client.next_status(lambda one: "packing life" in one.message, "the limit")
-    wait_beyond_a_recording(client)
-    assert "alarm_recording" not in client.last_values()
-    assert not (tmp_path / "valve_friction_ros" / "alarms").exists()

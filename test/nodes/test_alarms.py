@@ -7,27 +7,34 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Alarms and baselines over DDS: they outlive a killed node, and no call hides an alarm."""
+"""Alarms and baselines over DDS: their life, their answers, and that they outlive a killed node."""
 
 import math
 import re
 import sqlite3
+import time
 
 import pytest
 from histories import DAY, OTHER, START, VALVE, success
 from live_nodes import NAMESPACE, values_of
 from records import quick_record
 from std_msgs.msg import Float64
+from std_srvs.srv import SetBool
+from webhook_server import Receiver
 
-from valve_friction_ros.health import Baseline, Level
+from valve_friction_ros.health import AlarmAction, AlarmKind, AlarmRequest, Baseline, Level
 from valve_friction_ros.history import (
     AlarmRecording,
     HistoryFile,
     KeptBaseline,
+    alarm_events,
     keep_alarm_recording,
+    read_alarms,
+    request_many,
 )
 from valve_friction_ros.identification import identify
 from valve_friction_ros.model import BENCH_VALVE, HIGH_FRICTION
+from valve_friction_ros.settings import ALARM_KINDS
 
 NODE = f"{NAMESPACE}/identifier"
 OK, WARN, ERROR = b"\x00", b"\x01", b"\x02"
@@ -61,9 +68,12 @@ def test_an_alarm_outlives_a_kill(live):
     assert before.level == ERROR
     live.kill(node)
 
-    live.start_identifier(PATIENT)
+    node = live.start_identifier(PATIENT)
     after = client.next_status()
     assert after.level == ERROR
+    (line,) = (one for one in node.errors.splitlines() if "baseline coulomb friction 152.7" in one)
+    assert "from the history" in line
+    assert client.parameters(NODE, "baseline_coulomb_friction") == [OLD.coulomb_friction]
     assert AGE.sub("", after.message) == before.message
     assert AGE.search(after.message)
     old, new = values_of(before), values_of(after)
@@ -119,8 +129,8 @@ def test_stamps_of_a_time_to_come(live, history, tmp_path):
     history.add(success(now - 9 * DAY, 90.0, baseline=None))
     history.add(success(now + DAY, 400.0, baseline=None))
     history.set_baseline(VALVE, KeptBaseline(Baseline(100.0, 1.0), START, START))
-    for place, time in enumerate((now + DAY, now - DAY)):
-        one = AlarmRecording(time, Level.WARN, tmp_path / f"{place}", "excess friction")
+    for place, stamp in enumerate((now + DAY, now - DAY)):
+        one = AlarmRecording(stamp, Level.WARN, tmp_path / f"{place}", "excess friction")
         keep_alarm_recording(history, VALVE, one, days=365.0)
     live.start_identifier(PATIENT)
     client = live.client
@@ -192,14 +202,18 @@ def test_rows_that_cannot_be_read_stop_no_node(live, history, damage):
     live.client.identified(HEALTHY)
 
 
-def test_a_node_without_a_history_says_so(live):
+def test_a_node_without_a_history_says_so_and_keeps_nothing(live, history):
     live.start_identifier({**PATIENT, "history_file": "''"})
     client = live.client
     told = client.status_values()["history"]
     assert told == "none, as history_file is empty: diagnosis and baseline end with this node"
     client.identified(HEALTHY)
     assert client.trigger("set_baseline").message == f"baseline: {OLD}; before: none{TAKEN}"
+    assert client.last_values()["friction_ratio"] == "1"
     assert client.trigger("restore_baseline").message == f"baseline: none; before: {OLD}"
+    client.next_status(lambda one: "no baseline yet" in one.message, "no baseline")
+    assert math.isnan(*client.parameters(NODE, "baseline_coulomb_friction"))
+    assert not history.path.exists()
 
 
 def test_the_baseline_is_guarded_and_restored(live, history):
@@ -250,19 +264,6 @@ def test_the_baseline_is_guarded_and_restored(live, history):
     assert again.message.startswith("there is no ~/set_baseline to undo")
 
 
-def test_the_first_baseline_can_be_undone(live):
-    node = live.start_identifier(PATIENT)
-    client = live.client
-    client.identified(HEALTHY)
-    assert client.trigger("set_baseline").success
-    assert client.trigger("restore_baseline").message == f"baseline: none; before: {OLD}"
-    client.next_status(lambda one: "no baseline yet" in one.message, "no baseline")
-    assert math.isnan(*client.parameters(NODE, "baseline_coulomb_friction"))
-    live.kill(node)
-    live.start_identifier(PATIENT)
-    assert "baseline_coulomb_friction [N]" not in client.status_values()
-
-
 def test_a_baseline_of_the_parameter_is_replaced_and_comes_back(live, history):
     live.start_identifier({**PATIENT, "baseline_coulomb_friction": 140.0})
     client = live.client
@@ -280,3 +281,135 @@ def test_a_baseline_of_the_parameter_is_replaced_and_comes_back(live, history):
     answer = client.trigger("restore_baseline").message
     assert answer == f"baseline: {Baseline(145.0)}; before: {OLD}"
     assert history.baseline(VALVE.name).baseline == Baseline(145.0)
+
+
+KNOWN = {
+    "baseline_coulomb_friction": Baseline.of(identify(HEALTHY, BENCH_VALVE)).coulomb_friction,
+    "input_timeout": 600.0,
+}
+
+
+def state(client, kind, expected):
+    return client.next_status(
+        lambda one: values_of(one).get(f"alarm {kind}") == expected, f"{kind} {expected}"
+    )
+
+
+def ask(client, service, who="A. Operator", text="", hours=8.0, kind="all"):
+    given = {"alarm_who": who, "alarm_text": text, "alarm_hours": hours, "alarm_kind": kind}
+    assert all(one.successful for one in client.set_parameters(NODE, given))
+    if service != "out_of_service":
+        return client.trigger(service)
+    return client.call(SetBool, f"{NODE}/out_of_service", SetBool.Request(data=True))
+
+
+def test_settings_name_the_alarms():
+    assert tuple(one.value for one in AlarmKind) == ALARM_KINDS
+
+
+def test_a_life_of_an_alarm(live, history):
+    node = live.start_identifier(KNOWN)
+    client = live.client
+    assert values_of(client.next_status())["alarm friction_high"] == "normal"
+    refused = ask(client, "acknowledge")
+    assert (refused.success, refused.message) == (
+        False,
+        "no alarm can be acknowledged now: all alarms of the valve are normal",
+    )
+    client.identified(TIGHT)
+    raised = values_of(state(client, "friction_high", "unacknowledged"))
+    assert raised["alarm friction_high level"] == "ERROR"
+    assert raised["alarm friction_high message"].startswith("excess friction")
+    refused = client.trigger("acknowledge")
+    assert (refused.success, refused.message) == (
+        False,
+        "who is empty: give your name",
+    )
+    answer = ask(client, "acknowledge", text="repack on Monday")
+    assert (answer.success, answer.message) == (True, "friction high: acknowledged")
+    live.kill(node)
+
+    live.start_identifier(KNOWN)
+    state(client, "friction_high", "acknowledged")
+    answer = ask(client, "shelve", hours=2.0, kind="friction_high")
+    assert answer.message.startswith("friction high: shelved until 20")
+    shelved = values_of(state(client, "friction_high", "shelved"))
+    assert shelved["alarm friction_high level"] == "ERROR"
+    assert shelved["alarm friction_high until [time]"].startswith("20")
+    assert not ask(client, "shelve", hours=721.0).success
+    assert ask(client, "unshelve").success
+    state(client, "friction_high", "unacknowledged")
+    assert ask(client, "out_of_service", hours=100.0).success
+    state(client, "data_quality", "out of service")
+    client.identified(HEALTHY)
+    back = client.call(SetBool, f"{NODE}/out_of_service", SetBool.Request(data=False))
+    assert not back.success, "nobody has said who"
+    client.set_parameters(NODE, {"alarm_who": "B. Fitter"})
+    assert client.call(SetBool, f"{NODE}/out_of_service", SetBool.Request(data=False)).success
+    state(client, "friction_high", "normal")
+
+    events = [one.event for one in reversed(alarm_events(history))]
+    friction = [one for one in events if one.alarm.kind is AlarmKind.FRICTION_HIGH]
+    assert [one.action for one in friction] == [
+        AlarmAction.RAISE,
+        AlarmAction.ACKNOWLEDGE,
+        AlarmAction.SHELVE,
+        AlarmAction.UNSHELVE,
+        AlarmAction.TAKE_OUT,
+        AlarmAction.CLEAR,
+        AlarmAction.PUT_BACK,
+    ]
+    assert [one.who for one in friction][1:4] == ["A. Operator"] * 3
+    assert friction[1].text == "repack on Monday"
+    assert friction[-1].who == "B. Fitter"
+
+
+def test_an_impossible_request_is_refused_as_it_is_written(live):
+    live.start_identifier(KNOWN)
+    for name, value in (("alarm_kind", "unknown"), ("alarm_hours", float("inf"))):
+        (answer,) = live.client.set_parameters(NODE, {name: value})
+        assert not answer.successful
+        assert "\n" not in answer.reason
+
+
+def test_nobody_is_alerted_while_an_alarm_is_shelved(live):
+    with Receiver() as receiver:
+        live.start_identifier({**KNOWN, "webhook_url": receiver.url, "webhook_period": 0.0})
+        client = live.client
+        client.identified(TIGHT)
+        client.wait_until(lambda: len(receiver.requests) == 1, "an alert")
+        assert ask(client, "shelve").success
+        client.wait_until(lambda: len(receiver.requests) == 2, "that it is shelved")
+        client.identified(HEALTHY)
+        client.identified(TIGHT)
+        client.next_status()
+        client.next_status()
+        assert len(receiver.requests) == 2
+        assert ask(client, "unshelve").success
+        client.wait_until(lambda: len(receiver.requests) == 3, "that it is back")
+        client.watched.clear()
+        assert [(one["new_level"], one["alarms"]) for one in receiver.bodies] == [
+            ("ERROR", {"friction_high": "unacknowledged"}),
+            ("OK", {"friction_high": "shelved"}),
+            ("ERROR", {"friction_high": "unacknowledged"}),
+        ]
+
+
+def test_what_another_process_keeps_is_seen(live, history):
+    """The dashboard acknowledges many alarms at once, in the file."""
+    live.start_identifier(KNOWN)
+    client = live.client
+    client.identified(TIGHT)
+    state(client, "friction_high", "unacknowledged")
+    (valve,) = history.valves()
+    request = AlarmRequest(AlarmAction.ACKNOWLEDGE, "A. Operator", "all at once")
+    asked = [(valve, AlarmKind.FRICTION_HIGH)]
+    client.wait_until(lambda: read_alarms(history, valve.name), "the alarm in the file")
+    assert request_many(history, asked, request, time.time_ns()) == 1
+    state(client, "friction_high", "acknowledged")
+    client.identified(HEALTHY)
+    state(client, "friction_high", "normal")
+    client.wait_until(
+        lambda: read_alarms(history, valve.name)[AlarmKind.FRICTION_HIGH].state.name == "NORMAL",
+        "the end in the file",
+    )

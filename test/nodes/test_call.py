@@ -17,12 +17,11 @@ import time
 from pathlib import Path
 
 import pytest
+from faulty_identifier import faulty
 from live_nodes import NAMESPACE, PROJECT
 from records import quick_record
 
 from valve_friction_ros.model import HIGH_FRICTION
-
-SLOW = Path(__file__).with_name("slow_identifier.py")
 
 
 def start(domain, *arguments):
@@ -105,7 +104,7 @@ def test_an_unknown_service_lists_the_known(bench):
 @pytest.fixture
 def busy(live):
     """A domain with an identifier whose identification does not end."""
-    live.start_identifier(script=SLOW)
+    live.start_identifier(script=faulty("slow"))
     live.client.send_record(quick_record())
     live.client.wait_for_buffered(2 * len(quick_record()))
     return live

@@ -12,12 +12,15 @@
 import contextlib
 import importlib.metadata
 import threading
+import urllib.error
+import urllib.request
 
 import pytest
 import rclpy
 from lifecycle_msgs.msg import State, Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from live_nodes import NAMESPACE, values_of
+from local_server import free_port
 from rcl_interfaces.srv import GetParameters
 from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
 from rclpy.experimental import EventsExecutor
@@ -190,3 +193,32 @@ def test_a_wrong_parameter_leaves_the_node_unconfigured(live, compose):
         assert state(client) == State.PRIMARY_STATE_UNCONFIGURED
         client.set_parameters(IDENTIFIER, {"warn_ratio": 1.5})
         assert change(client, Transition.TRANSITION_CONFIGURE)
+
+
+def test_pages_rest_with_the_node(live):
+    port = free_port()
+    live.start("dashboard", {"port": port, "lifecycle": True}, namespace=None)
+    client = live.client
+
+    def change(transition):
+        request = ChangeState.Request(transition=Transition(id=transition))
+        assert client.call(ChangeState, "/dashboard/change_state", request).success
+
+    def page():
+        try:
+            with urllib.request.urlopen(f"http://127.0.0.1:{port}/", timeout=5) as answer:
+                return answer.status
+        except urllib.error.HTTPError as error:
+            return error.code
+        except OSError:
+            return None
+
+    client.wait_until(lambda: page() == 503, "a page of a dashboard at rest")
+    for _ in range(2):
+        change(Transition.TRANSITION_CONFIGURE)
+        assert page() == 503
+        change(Transition.TRANSITION_ACTIVATE)
+        assert page() == 200
+        change(Transition.TRANSITION_DEACTIVATE)
+        assert page() == 503
+        change(Transition.TRANSITION_CLEANUP)

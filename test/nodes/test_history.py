@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""What an identifier keeps, and what it takes over when it starts again."""
+"""What an identifier keeps, in a file and on a server, and takes over when it starts again."""
 
 import math
 
@@ -17,10 +17,19 @@ from live_nodes import NAMESPACE, values_of
 from records import quick_record
 
 from valve_friction_ros.health import Baseline, DatedNumber, SlidingFriction
-from valve_friction_ros.history import MONTH, HistoryFile, KeptBaseline, trend_of
+from valve_friction_ros.history import (
+    MONTH,
+    History,
+    HistoryFile,
+    KeptBaseline,
+    copied,
+    sender_of,
+    trend_of,
+)
+from valve_friction_ros.history.outbox import count_unsent
 from valve_friction_ros.history.status_values import trend_values
 from valve_friction_ros.identification import identify
-from valve_friction_ros.model import BENCH_VALVE, HIGH_FRICTION
+from valve_friction_ros.model import BENCH_VALVE
 
 NODE = f"{NAMESPACE}/identifier"
 OK, WARN = b"\x00", b"\x01"
@@ -61,26 +70,6 @@ def test_success_and_refusal_are_kept(live, history):
 
 
 class TestBaseline:
-    def test_it_survives_a_restart(self, live, history):
-        first = live.start_identifier(PATIENT)
-        live.client.identified(RECORD)
-        answer = live.client.trigger("set_baseline")
-        assert answer.success
-        assert "lost" not in answer.message
-        first.stop()
-        live.client.watched.clear()
-        second = live.start_identifier(PATIENT)
-        values = first_values(live)
-        assert float(values["baseline_coulomb_friction [N]"]) == pytest.approx(EXPECTED.value)
-        assert float(values["baseline half width [N]"]) == pytest.approx(EXPECTED.half_width)
-        shown = live.client.parameters(NODE, "baseline_coulomb_friction")
-        assert shown == [EXPECTED.value]
-        (line,) = logged(live, second, "baseline coulomb friction 152.7 ± ")
-        assert "from the history" in line
-        assert str(history.path) in line
-        live.client.identified(quick_record(HIGH_FRICTION))
-        assert live.client.last_values()["NE 107"] == "F"
-
     def test_a_parameter_comes_first(self, live, history):
         history.set_baseline(VALVE, KeptBaseline(Baseline(152.7, 1.0), START, START))
         node = live.start_identifier({**PATIENT, "baseline_coulomb_friction": 140.0})
@@ -103,16 +92,6 @@ class TestBaseline:
         client.next_status(lambda status: key not in values_of(status), "no baseline")
 
 
-def test_what_was_answered_survives_a_kill(live, history):
-    node = live.start_identifier(PATIENT)
-    live.client.identified(RECORD)
-    assert live.client.trigger("set_baseline").success
-    node.kill()
-    live.nodes.remove(node)
-    assert history.entries()[-1].friction == EXPECTED
-    assert history.baseline(VALVE.name).baseline == Baseline.of(RESULT)
-
-
 def test_retention(live, history):
     for day in (4000, 1):
         history.add(success(START - day * DAY))
@@ -121,17 +100,6 @@ def test_retention(live, history):
     kept = [entry.time for entry in history.entries()]
     assert START - DAY in kept
     assert START - 4000 * DAY not in kept
-
-
-def test_nothing_is_kept_without_a_file(live, history, tmp_path):
-    before = {path.name for path in tmp_path.iterdir()}
-    live.start_identifier({**PATIENT, "history_file": "''"})
-    live.client.identified(RECORD)
-    assert live.client.trigger("set_baseline").success
-    assert live.client.last_values()["friction_ratio"] == "1"
-    after = {path.name for path in tmp_path.iterdir()} - before
-    assert all(name.startswith("identifier-") for name in after)
-    assert not history.path.exists()
 
 
 def test_a_history_that_cannot_be_written(live, tmp_path):
@@ -214,3 +182,85 @@ def test_only_a_significant_drift_has_keys():
         "friction_drift of",
     }
     assert set(trend_values(trend_of(rising))) == keys
+
+
+NAME = "VALVE_FRICTION_HISTORY_URL"
+
+
+def sent(client, history):
+    """Wait until nothing waits, and the diagnostics say so: they lag by a second."""
+    return client.status_values(
+        lambda status: (
+            not count_unsent(history.path).waiting
+            and values_of(status).get("history_server waiting") == "0"
+            and values_of(status)["history_server problem"] == ""
+        ),
+        "a history that was sent",
+    )
+
+
+def test_rows_arrive_and_wait_while_the_server_is_away(live, history, database, postgres):
+    node = live.start_identifier({"history_url": database.url})
+    client = live.client
+    client.identified(RECORD)
+    assert client.trigger("set_baseline").success
+    values = sent(client, history)
+    assert values["history_server"] == str(database)
+    assert len(History(database).entries()) == len(history.entries())
+    postgres.kill()
+    try:
+        client.identified(RECORD)  # answered as ever
+        values = client.status_values(
+            lambda status: (
+                int(values_of(status)["history_server waiting"]) > 0
+                and values_of(status)["history_server problem"]
+            ),
+            "rows that wait",
+        )
+        assert "check that the server runs" in values["history_server problem"]
+        assert values["history_server waiting since [time]"].startswith("20")
+    finally:
+        postgres.start()
+    sent(client, history)
+    assert all(one.is_same for one in copied(history.path, database))
+    assert f"the history waits in {history.path}" in node.errors
+
+
+def test_without_a_server_it_starts_and_says_so(live, history, database, postgres):
+    history.set_baseline(VALVE, KeptBaseline(Baseline(152.7, 1.0), START, START))
+    postgres.stop()
+    try:
+        live.start_identifier({"history_url": database.url})
+        values = live.client.status_values(what="the first diagnostic")
+        assert str(database) in values["history_server not taken"]
+        assert float(values["baseline_coulomb_friction [N]"]) == 152.7
+    finally:
+        postgres.start()
+
+
+def test_what_another_machine_kept_is_taken(live, history, database, tmp_path):
+    other = HistoryFile(tmp_path / "other.sqlite")
+    other.set_baseline(VALVE, KeptBaseline(Baseline(152.7, 1.0), START, START))
+    other.add(success(baseline=Baseline(152.7, 1.0)))
+    sender = sender_of(other.path, database)
+    assert sender.take(VALVE) is None
+    sender.end()
+    live.start_identifier({"history_url": database.url})
+    values = live.client.status_values(what="the first diagnostic")
+    assert float(values["baseline_coulomb_friction [N]"]) == 152.7
+    assert values["estimate_from"] == "before the restart"
+    assert "history_server not taken" not in values
+    assert len(history.entries()) == 1
+
+
+def test_a_password_of_the_environment_is_never_shown(live, database, postgres, monkeypatch):
+    url = postgres.url(database.url.rpartition("/")[2], "nobody", "s3cret")
+    monkeypatch.setenv(NAME, url)
+    node = live.start_identifier()
+    values = live.client.status_values(
+        lambda status: values_of(status).get("history_server problem"), "a problem"
+    )
+    assert "check user and password" in values["history_server problem"]
+    assert "s3cret" not in str(values)
+    assert "s3cret" not in node.errors
+    assert "s3cret" not in str(live.client.parameters(NODE, "history_url"))

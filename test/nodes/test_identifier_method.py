@@ -38,11 +38,6 @@ def client(shared):
     return shared.client
 
 
-def test_the_choice_is_described(client):
-    (descriptor,) = client.describe(NODE, ["method"])
-    assert descriptor.additional_constraints == "one of plant, bench, published, signature"
-
-
 def test_a_signature_is_identified(client):
     message = client.identified(signature_record())
     assert "the stem ignores reversals smaller than 21 % of its travel" in message
@@ -64,15 +59,6 @@ def test_a_signature_is_identified(client):
     assert values["estimate_valid"] == "true"
     assert values["coulomb_friction verdict"] == "weak"
     assert float(values["fit [%]"]) == pytest.approx(100 * expected.fit, rel=1e-8)
-
-
-def test_another_record_is_refused_with_what_it_needs(client):
-    assert client.trigger("clear").success
-    client.send_record(quick_record())
-    response = client.identify_all(2 * len(quick_record()))
-    assert not response.success
-    assert "does not slide at a constant speed" in response.message
-    assert "slow triangular wave of pressure" in response.message
 
 
 def test_the_method_can_be_changed_while_the_node_runs(client):
@@ -106,15 +92,3 @@ def test_the_timing_uncertainty_widens_the_intervals(client):
         assert told[uncertainty] == expected.parameters["viscous_friction"].half_width
     assert told[0.0] < told[0.2]
     assert client.set_together(NODE, {"timing_uncertainty": np.nan}).successful
-
-
-def test_the_calibration_widens_the_intervals(client):
-    shares = {"area_uncertainty": 0.03, "position_scale_uncertainty": 0.04}
-    assert client.set_together(NODE, shares).successful
-    client.identified(quick_record())
-    told = client.half_widths("coulomb_friction", "spring_constant")
-    expected = identify(quick_record(), BENCH_VALVE, IdentificationSettings(**shares)).parameters
-    for name, share in (("coulomb_friction", 0.03), ("spring_constant", 0.05)):
-        one = expected[name]
-        assert told[name] == one.half_width > 2 * share * one.value
-    assert client.set_together(NODE, dict.fromkeys(shares, 0.0)).successful

@@ -100,20 +100,3 @@ def test_best_effort_and_reliable_publishers_alike(client):
         publisher(client, JointState, STEM, best_effort) as made,
     ):
         sends_until_taken(client, made)
-
-
-def test_data_end_the_warning(client):
-    with publisher(client, FluidPressure, PRESSURE) as pressure:
-        client.wait_until(pressure.get_subscription_count, "the subscription")
-        seen, stamp = len(client.statuses), START
-
-        def is_quiet():
-            nonlocal stamp
-            stamp += 20_000_000
-            message = FluidPressure(fluid_pressure=1e5)
-            message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, 10**9)
-            pressure.publish(message)
-            return any(PRESSURE not in status.message for _, status in client.statuses[seen:])
-
-        client.wait_until(is_quiet, "a diagnostic without a warning of the pressure")
-    warned_of(client, PRESSURE, "nobody publishes it")

@@ -9,11 +9,6 @@
 
 """The main job over topics: samples in, friction out, to the last bit what the core computes."""
 
-import json
-import subprocess
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 from live_nodes import (
@@ -23,12 +18,11 @@ from live_nodes import (
     STREAM,
     buffered,
     stamp_of,
-    stamps_of,
     time_of,
     values_of,
 )
 from rclpy.qos import QoSProfile, ReliabilityPolicy
-from records import bench_record, simulated
+from records import bench_record
 from sensor_msgs.msg import FluidPressure
 from std_msgs.msg import Float64, Header
 
@@ -37,17 +31,12 @@ from valve_friction_ros.identification import (
     UNITS,
     IdentificationSettings,
     identify_bench,
-    published_estimate,
 )
 from valve_friction_ros.model import (
     BENCH_VALVE,
     LOW_FRICTION,
-    Recording,
-    SineWave,
 )
-from valve_friction_ros.signals import differentiate
 
-EMPS = Path(__file__).parents[3] / "shared/data/emps/emps_identification.csv"
 BIAS = 1.13e-3
 
 
@@ -58,8 +47,8 @@ def bench(shared):
     client = shared.client
     early = client.listen(Float64, f"{NAMESPACE}/identifier/friction/coulomb_friction")
     record = bench_record()
-    stamps = stamps_of(record)
-    client.send_without_loss((stamps, record.pressure), (stamps, record.position))
+    client.send_record(record)
+    client.wait_for_buffered(2 * len(record))
     response = client.trigger("identify")
     assessment = identify_bench(record, BENCH_VALVE, IdentificationSettings(position_bias=BIAS))
     return client, assessment, response, early
@@ -178,99 +167,6 @@ def test_diagnostics(bench):
     assert values["reason"] == ""
     assert values["NE 107"] == ""
     assert response.message in status.message
-
-
-@pytest.mark.timeout(100)
-def test_real_machine_gives_the_numbers_of_the_command(live):
-    if not EMPS.is_file():
-        pytest.skip(f"the EMPS record is not here ({EMPS.name}): it may not be redistributed")
-    command = [sys.executable, "-m", "valve_friction_ros", "identify", str(EMPS)]
-    told = subprocess.run(
-        [*command, "--fix", "spring_constant=0", "--json"],
-        cwd=Path(__file__).parents[2],
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    expected = json.loads(told.stdout)
-
-    time, force, position = np.loadtxt(EMPS, delimiter=",", skiprows=1, unpack=True)
-    live.start_identifier(
-        {
-            "diaphragm_area": 1.0,
-            "pressure_reference": 0.0,
-            "travel": ".inf",
-            "pressure_minimum": "-.inf",
-            "pressure_maximum": ".inf",
-            "fixed.spring_constant": 0.0,
-            "window": 60.0,
-        }
-    )
-    client = live.client
-    stamps = np.rint(time * SECOND).astype(np.int64)
-    client.send_without_loss((stamps, force), (stamps, position))
-    response = client.trigger("identify")
-    assert response.success, response.message
-    figures = ("threshold", "sigma", "r_squared")
-    numbers = {
-        **{name: expected["parameters"][name]["value"] for name in UNITS},
-        **{name: expected["evidence"][name] for name in figures},
-        "fit": expected["fit"],
-    }
-    known = {name: np.nan if value is None else value for name, value in numbers.items()}
-    told = client.friction(*UNITS, *figures, "fit")
-    assert as_told({name: told[name] for name in figures}) == as_told(
-        {name: known[name] for name in figures}
-    )
-    # The stamps are whole nanoseconds: an average at the edge of an outlier may fall either way.
-    for name in (*UNITS, "fit"):
-        assert float(told[name]) == pytest.approx(known[name], rel=1e-4, nan_ok=True), name
-    published = {name: expected["parameters"][name]["published"] for name in UNITS}
-    assert as_told(client.published(*UNITS)) == as_told(published)
-    status = client.status_values(lambda s: "samples" in values_of(s))
-    assert int(status["samples"]) == expected["evidence"]["samples"]
-
-
-def test_signals_of_different_rates(live):
-    """Stem at 1 kHz, pressure at 250 Hz and 0.4 ms late, against one record of both.
-
-    Linear interpolation over h = 4 ms misses a sine of amplitude A and angular frequency ω by
-    A·(ωh)²/8 at most. As the force enters the regression linearly, F_c is then off by at most
-    that force times the sum of magnitudes of its row of the pseudo-inverse.
-    """
-    settings = {"mass": LOW_FRICTION.mass, "limit_velocity": 2e-3}
-    wave = SineWave(period=10.0)
-    fixed = {f"fixed.{name}": value for name, value in settings.items()}
-    live.start_identifier({"method": "bench", **fixed})
-    client = live.client
-
-    milliseconds = np.arange(10_000)
-    record = simulated(wave.sample(milliseconds / 1000), 1e-3)
-    late = np.arange(400_000, 10_000 * 1_000_000, 4_000_000)  # ns
-    client.send_without_loss(
-        (START + late, wave.sample(late / SECOND)),
-        (START + 1_000_000 * milliseconds, record.position),
-    )
-    response = client.trigger("identify")
-    assert response.success, response.message
-
-    both = slice(1, int(late[-1] // 1_000_000) + 1)  # the grid: positions that pressure surrounds
-    together = Recording(1e-3, record.pressure[both], record.position[both])
-    expected = published_estimate(together, BENCH_VALVE, IdentificationSettings(fixed=settings))
-    derivatives = differentiate(together.position, 1e-3)
-    velocity = derivatives.velocity
-    fast = np.abs(velocity) > settings["limit_velocity"]
-    columns = [np.sign(velocity), velocity, derivatives.inner(together.position)]
-    regressors = np.column_stack([*columns, np.ones_like(velocity)])[fast]
-    amplification = np.abs(np.linalg.pinv(regressors)[0]).sum()
-    amplitude = (wave.high - wave.low) / 2
-    force = BENCH_VALVE.diaphragm_area * amplitude * (2 * np.pi / wave.period * 4e-3) ** 2 / 8
-    assert amplification * force < 0.01  # N: the bound says something
-
-    identified = client.published("coulomb_friction")["coulomb_friction"]
-    assert identified != expected.coulomb_friction  # it was interpolated
-    assert abs(identified - expected.coulomb_friction) <= amplification * force
-    assert identified == pytest.approx(LOW_FRICTION.coulomb_friction, rel=1e-3)
 
 
 def test_stream_is_received_by_the_quality_of_service_of_the_parameters(live):

@@ -48,6 +48,8 @@ BAD_CHANGES = [  # changes, words of the reason
     ({"diaphragm_area": "large"}, "expected 'Type.DOUBLE' got 'Type.STRING'"),
     ({"window": 1}, "expected 'Type.DOUBLE' got 'Type.INTEGER'"),  # the words are rclpy's
     ({"spring_constant": "large"}, "spring_constant: expected 'Type.DOUBLE' got 'Type.STRING'"),
+    ({"mass": -1.0}, "mass"),
+    ({"spring_constant": 2e11}, "spring_constant"),
     ({"mass": 1}, "mass: expected 'Type.DOUBLE' got 'Type.INTEGER'"),
     ({"window": -1.0}, "window"),
     ({"input_timeout": 0.0}, "input_timeout"),

@@ -16,6 +16,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 import rclpy
+import waiting
 from live_nodes import PATIENCE, SECOND, Client, Domain, time_of
 from rclpy.duration import Duration
 from rclpy.executors import SingleThreadedExecutor
@@ -56,11 +57,7 @@ def bench():
 
 
 def wait_until(condition, what):
-    deadline = time.monotonic() + PATIENCE
-    while not (met := condition()):
-        assert time.monotonic() < deadline, f"not within {PATIENCE:g} s: {what}"
-        time.sleep(0.01)
-    return met
+    return waiting.wait_until(condition, lambda: what, PATIENCE)
 
 
 def sender(client, polled):

@@ -24,7 +24,7 @@ import bags
 import numpy as np
 import pytest
 import yaml
-from disk_trouble_identifier import FINISH, FULL, SCRIPT, SLOW
+from faulty_identifier import FINISH, FULL, SLOW, faulty
 from live_nodes import NAMESPACE, PROJECT, SECOND, STREAM, stamps_of, time_of
 from rclpy.duration import Duration
 from records import quick_record
@@ -118,7 +118,7 @@ def run(shared, tmp_path_factory):
 
         client.node.create_subscription(kind, topic, record, STREAM, raw=True)
     parameters = {"window": WINDOW, "save_folder": str(folder / "saved"), "input_timeout": 600.0}
-    shared.start("identifier", parameters, script=SCRIPT)
+    shared.start("identifier", parameters, script=faulty("disk_trouble"))
     client.connect(readers=2)
     samples = quick_record()
     client.send_record(samples)
@@ -181,22 +181,12 @@ def test_a_saved_buffer_gives_the_numbers_of_the_node(run):
         assert numbers_of(identified(saved, *options)) == run.numbers
 
 
-def test_the_numbers_and_their_evidence_are_those_of_the_node(run):
-    assert run.client.set_together(IDENTIFIER, {"method": "bench"}).successful
-    assert run.client.trigger("identify").success
-    numbers = told_by(run.client)
-    assert run.client.set_together(IDENTIFIER, {"method": "plant"}).successful
-    assert "nan" not in (numbers["threshold"], numbers["published coulomb_friction"])
-    saved = Path(run.client.trigger("save").message)
-    answer = identified(saved, "--method", "bench")
-    assert numbers_of(answer) == numbers
-
-
 def test_a_saved_buffer_knows_the_settings_of_the_node(run):
     changes = {"method": "bench", "fixed.mass": 1.6, "derivative_window": 21}
     assert run.client.set_together(IDENTIFIER, changes).successful
     assert run.client.trigger("identify").success
     numbers = told_by(run.client)
+    assert "nan" not in (numbers["threshold"], numbers["published coulomb_friction"])
     saved = Path(run.client.trigger("save").message)
     before = {"method": "plant", "fixed.mass": math.nan, "derivative_window": 0}
     assert run.client.set_together(IDENTIFIER, before).successful
@@ -231,29 +221,22 @@ def messages(bag):
 def start_saving_into(live, folder, **parameters):
     """Start the node with the disk's troubles, and give it two samples."""
     parameters = {"save_folder": str(folder), "window": WINDOW, **parameters}
-    live.start_identifier(parameters, script=SCRIPT)
+    live.start_identifier(parameters, script=faulty("disk_trouble"))
     live.client.send_record(quick_record())
     live.client.identified_whole(held(quick_record()))
 
 
-@pytest.mark.parametrize(
-    ("name", "reason"),
-    [
-        ("file/folder", "Not a directory"),
-        (FULL, "File too large"),
-        ("~nobody-of-that-name/bags", "Could not determine home directory."),
-    ],
-)
-def test_what_cannot_be_saved_is_told_and_the_node_goes_on(live, tmp_path, name, reason):
+def test_what_cannot_be_written_is_told_and_the_node_goes_on(live, tmp_path):
     (tmp_path / "file").write_text("")
-    folder = Path(name) if name.startswith("~") else tmp_path / name
-    start_saving_into(live, folder)
-    response = live.client.trigger("save")
-    assert not response.success
-    assert response.message == f"cannot write a bag into {folder}: {reason}"
+    folders = {"save": (tmp_path / FULL, "a bag", "File too large"),
+               "report": (tmp_path / "file" / "pages", "a report", "Not a directory")}  # fmt: skip
+    start_saving_into(live, folders["save"][0], report_folder=folders["report"][0])
+    for service, (folder, what, reason) in folders.items():
+        response = live.client.trigger(service)
+        assert not response.success
+        assert response.message == f"cannot write {what} into {folder}: {reason}"
     assert live.client.trigger("identify").success
-    if folder.exists():
-        assert list(folder.iterdir()) == []
+    assert list((tmp_path / FULL).iterdir()) == []
 
 
 def test_the_node_goes_on_while_it_saves(live, tmp_path):

@@ -10,14 +10,12 @@
 """The report of the last estimate: drawn from its own record, whatever came since."""
 
 import re
-import subprocess
-import sys
 import time
 from pathlib import Path
 
 import pytest
 from histories import DAY, success
-from live_nodes import NAMESPACE, PROJECT
+from live_nodes import NAMESPACE
 from pages import PageReader
 from records import quick_record
 
@@ -96,25 +94,6 @@ def test_friction_is_judged_against_the_baseline_in_force(bench):
     assert message.startswith(shown)  # and what else was found
 
 
-@pytest.mark.parametrize(
-    ("name", "reason"),
-    [
-        ("file/folder", "Not a directory"),
-        ("~nobody-of-that-name/reports", "Could not determine home directory."),
-    ],
-)
-def test_what_cannot_be_written_is_told_and_the_node_goes_on(live, tmp_path, name, reason):
-    (tmp_path / "file").write_text("")
-    folder = name if name.startswith("~") else str(tmp_path / name)
-    live.start_identifier({"report_folder": folder})
-    client = live.client
-    client.identified(quick_record())
-    response = client.trigger("report")
-    assert not response.success
-    assert response.message == f"cannot write a report into {folder}: {reason}"
-    assert client.trigger("identify").success
-
-
 def test_the_trend_and_the_signature_of_the_baseline_are_those_of_the_history(live, tmp_path):
     """Also after a restart: identifications of five days before, and the record of a baseline."""
     kept = HistoryFile(tmp_path / "history.sqlite")
@@ -144,17 +123,3 @@ def test_the_trend_and_the_signature_of_the_baseline_are_those_of_the_history(li
     assert "Trend" not in page.said("h2")
     assert not [one for one in page.said("figcaption") if "Grey" in one]
     assert [text for text in page.said("p") if text.startswith("no trend, as the history cannot")]
-
-
-def test_a_node_that_reports_nothing_loads_nothing_for_it():
-    code = "import sys, valve_friction_ros.nodes.identifier.node; print(*sys.modules, sep='\\n')"
-    loaded = subprocess.run(
-        [sys.executable, "-c", code],
-        cwd=PROJECT,
-        capture_output=True,
-        text=True,
-        check=True,
-        timeout=60,
-    ).stdout.split()
-    assert "valve_friction_ros.nodes.identifier.requested_files" in loaded
-    assert not {"matplotlib", "jinja2", "valve_friction_ros.reports"} & set(loaded)

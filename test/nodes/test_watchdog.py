@@ -15,12 +15,10 @@ import socket
 import threading
 import time
 
-import frozen_identifier
 import pytest
-import stuck_identifiers
+from faulty_identifier import BLOCK, CLEAN_UP, FINISH, FREEZE, LOOP, MIDDLEWARE, faulty
 from live_nodes import NAMESPACE, PATIENCE, values_of
 from records import quick_record
-from slow_identifier import FINISH, SCRIPT
 from std_srvs.srv import Trigger
 
 from valve_friction_ros.nodes.plumbing.worker import Worker, workers_have_ended
@@ -78,11 +76,11 @@ def stuck(live, tmp_path, systemd):
     process = live.start(
         "identifiers",
         {"valves": "[fv_101, fv_102]"},
-        script=stuck_identifiers.SCRIPT,
+        script=faulty("stuck"),
         namespace=None,
     )
     wait_to_hear(live.client, systemd, "READY=1")
-    return process, tmp_path / stuck_identifiers.BLOCK
+    return process, tmp_path / BLOCK
 
 
 def test_a_loop_that_stands_still(live, systemd, stuck):
@@ -126,7 +124,7 @@ def test_a_stuck_node_ends_all_the_same(live, stuck, number):
 
 
 def test_an_identification_that_does_not_return(live, tmp_path, systemd):
-    process = live.start_identifier({"identification_limit": 1.0}, script=SCRIPT)
+    process = live.start_identifier({"identification_limit": 1.0}, script=faulty("slow"))
     client = live.client
     client.send_record(quick_record())
     client.wait_for_buffered(1000)
@@ -145,7 +143,7 @@ def test_an_identification_that_does_not_return(live, tmp_path, systemd):
 
 
 def test_ctrl_c_leaves_an_identification_that_does_not_return(live):
-    process = live.start_identifier(script=SCRIPT)
+    process = live.start_identifier(script=faulty("slow"))
     client = live.client
     client.send_record(quick_record())
     client.wait_for_buffered(1000)
@@ -170,21 +168,6 @@ class TestWorker:
             assert done.result() is True
             assert worker.busy_for() == 0.0
 
-    def test_preparation_comes_first(self):
-        finish, order = threading.Event(), []
-
-        def prepare():
-            finish.wait(PATIENCE)
-            order.append("prepared")
-
-        with Worker("test", prepare) as worker:
-            done = worker.submit(order.append, "worked")
-            assert worker.is_preparing
-            finish.set()
-            done.result()
-            assert not worker.is_preparing
-            assert order == ["prepared", "worked"]
-
     @pytest.mark.parametrize("finishes", [True, False])
     def test_the_end_waits_for_what_finishes(self, finishes):
         with Worker("test", finishes=finishes) as worker:
@@ -195,14 +178,14 @@ class TestWorker:
 
 def frozen_end(live, tmp_path, what):
     """Freeze an identifier within C; return its process when it has ended, and the time it took."""
-    process = live.start("identifier", script=frozen_identifier.SCRIPT)
+    process = live.start("identifier", script=faulty("frozen"))
     live.client.next_status()
     live.client.watched.clear()
     live.nodes.remove(process)
     (tmp_path / "draft").write_text(what)
-    (tmp_path / "draft").rename(tmp_path / frozen_identifier.FREEZE)
+    (tmp_path / "draft").rename(tmp_path / FREEZE)
     begin = time.monotonic()
-    if what == frozen_identifier.CLEAN_UP:
+    if what == CLEAN_UP:
         process.interrupt()
     try:
         assert process.exit_code() == 1, process.errors
@@ -214,22 +197,22 @@ def frozen_end(live, tmp_path, what):
 @pytest.mark.parametrize(
     ("what", "where"),
     [
-        (frozen_identifier.LOOP, "in _run"),
-        (frozen_identifier.MIDDLEWARE, "in _end_if_the_middleware_hangs"),
-        (frozen_identifier.CLEAN_UP, "in _run_until"),
+        (LOOP, "in _run"),
+        (MIDDLEWARE, "in _end_if_the_middleware_hangs"),
+        (CLEAN_UP, "in _run_until"),
     ],
 )
 def test_a_process_that_is_frozen_within_c_ends_by_itself(live, tmp_path, what, where):
     process, lasted = frozen_end(live, tmp_path, what)
     assert where in process.errors
     assert "Timeout (" in process.errors
-    if what == frozen_identifier.CLEAN_UP:
+    if what == CLEAN_UP:
         assert lasted < WITHIN + 1.0
 
 
 def test_silent_inputs_alone_end_nothing(live):
     """The middleware is asked several times, and answers."""
-    process = live.start("identifier", script=frozen_identifier.SCRIPT)
+    process = live.start("identifier", script=faulty("frozen"))
     live.client.next_status()
     begin = time.monotonic()
     live.client.wait_until(lambda: time.monotonic() > begin + 4.0, "four seconds")

@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 from histories import DAY, OTHER, SECOND, START, VALVE, refused, success
 
+from valve_friction_ros import history as kept
 from valve_friction_ros.evidence import FrictionChange, Move
 from valve_friction_ros.health import (
     AlarmAction,
@@ -28,31 +29,7 @@ from valve_friction_ros.health import (
     SlidingFriction,
     StatusSignal,
 )
-from valve_friction_ros.history import (
-    AlarmFilter,
-    AlarmRecording,
-    KeptBaseline,
-    alarm_events,
-    alarm_recordings,
-    follow_alarms,
-    keep_alarm_recording,
-    keep_answers,
-    keep_change,
-    keep_moves,
-    keep_reference,
-    keep_renewal,
-    keep_told_level,
-    keep_usage,
-    read_alarms,
-    read_answers,
-    read_change,
-    read_moves,
-    read_reference,
-    read_told_level,
-    read_usage,
-    request_alarms,
-    valve_histories,
-)
+from valve_friction_ros.history import AlarmFilter, AlarmRecording, KeptBaseline
 from valve_friction_ros.model import BENCH_VALVE, Recording, Valve
 from valve_friction_ros.response import StepAnswer
 from valve_friction_ros.usage import BINS, Usage, UsedDay
@@ -84,12 +61,12 @@ def fill(history, valve=VALVE):
     drive = 1e5 + 100.0 * np.arange(100)
     record = Recording(0.01, drive, drive / 1e8)
     baseline = Baseline(140.0, 2.0, SLIDING, numbers=NUMBERS)
-    keep_renewal(history, valve, START - DAY)
-    for kept in (
+    kept.keep_renewal(history, valve, START - DAY)
+    for one in (
         KeptBaseline(Baseline(150.0), START, START),
         KeptBaseline(baseline, START + 3, START, record, Baseline(150.0), level=Level.WARN),
     ):
-        history.set_baseline(valve, kept)
+        history.set_baseline(valve, one)
     for entry in (
         success(START, 150.123456789, 1 / 3, valve=valve, warnings=("one", "two")),
         success(START + 2, valve=valve, baseline=baseline, sliding=SLIDING, numbers=NUMBERS),
@@ -97,18 +74,18 @@ def fill(history, valve=VALVE):
     ):
         history.add(entry)
     for run, day in (("run 1", 0), ("run 2", 0), ("run 2", 1)):
-        keep_usage(history, valve, run, [UsedDay(START // DAY + day, START - DAY, usage(1.5))])
+        kept.keep_usage(history, valve, run, [UsedDay(START // DAY + day, START - DAY, usage(1.5))])
     one = AlarmRecording(START, Level.ERROR, Path("/alarms/1"), "excess friction")
-    keep_alarm_recording(history, valve, one)
-    keep_told_level(history, valve, Level.ERROR)
-    keep_moves(history, valve, BUILT, [*map(service_move, range(4))])
-    keep_reference(history, valve, BUILT, Reference(SLIDING, START))
-    keep_change(history, valve, BUILT, FrictionChange(START, START + DAY, 1.5, 1.4, 1.6))
+    kept.keep_alarm_recording(history, valve, one)
+    kept.keep_told_level(history, valve, Level.ERROR)
+    kept.keep_moves(history, valve, BUILT, [*map(service_move, range(4))])
+    kept.keep_reference(history, valve, BUILT, Reference(SLIDING, START))
+    kept.keep_change(history, valve, BUILT, FrictionChange(START, START + DAY, 1.5, 1.4, 1.6))
     grown = Condition(Level.WARN, StatusSignal.MAINTENANCE_REQUIRED, "friction has grown")
-    follow_alarms(history, valve, {AlarmKind.FRICTION_HIGH: grown}, START)
+    kept.follow_alarms(history, valve, {AlarmKind.FRICTION_HIGH: grown}, START)
     shelving = AlarmRequest(AlarmAction.SHELVE, "A. Operator", "repack on Monday", 3600.0)
-    request_alarms(history, valve, None, shelving, START + SECOND)
-    keep_answers(history, valve, 0.02, [answer(1), answer(2, float("nan")), answer(0)])
+    kept.request_alarms(history, valve, None, shelving, START + SECOND)
+    kept.keep_answers(history, valve, 0.02, [answer(1), answer(2, float("nan")), answer(0)])
 
 
 def all_of(history):
@@ -122,15 +99,15 @@ def all_of(history):
             history.last_success(name) if history.entries([name]) else None,
             history.known_numbers(name, BENCH_VALVE, 0),
             history.points(name, "bench"),
-            read_usage(history, name),
-            alarm_recordings(history, name),
-            read_told_level(history, name),
-            read_alarms(history, name),
-            alarm_events(history, AlarmFilter(valve=name)),
-            read_moves(history, name, BUILT),
-            read_reference(history, name, BUILT),
-            read_change(history, name, BUILT),
-            read_answers(history, name),
-            valve_histories(history, [valve], 0, 2**62),
+            kept.read_usage(history, name),
+            kept.alarm_recordings(history, name),
+            kept.read_told_level(history, name),
+            kept.read_alarms(history, name),
+            kept.alarm_events(history, AlarmFilter(valve=name)),
+            kept.read_moves(history, name, BUILT),
+            kept.read_reference(history, name, BUILT),
+            kept.read_change(history, name, BUILT),
+            kept.read_answers(history, name),
+            kept.valve_histories(history, [valve], 0, 2**62),
         ]
     return [repr(one) for one in found]

@@ -50,8 +50,6 @@ STREAM = QoSProfile(depth=60_000, reliability=ReliabilityPolicy.RELIABLE)
 LATCHED = QoSProfile(
     depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
 )
-_AHEAD = 20_000
-"""Messages that may be under way; the identifier holds as many of each topic."""
 _BURST = 200
 """Messages that are published at once; a transport's queue holds 512."""
 
@@ -90,7 +88,8 @@ class NodeProcess:
         self.name = f"{namespace or ''}/{name}"
         self._output = folder / f"{name}-{time.monotonic_ns()}.out"
         self._errors = self._output.with_suffix(".err")
-        what = ["-m", f"valve_friction_ros.nodes.{name}"] if script is None else [str(script)]
+        script = ["-m", f"valve_friction_ros.nodes.{name}"] if script is None else script
+        what = script if isinstance(script, list) else [str(script)]
         place = [] if namespace is None else ["-r", f"__ns:={namespace}"]
         command = [sys.executable, *what, "--ros-args", *place, *arguments]
         for key, value in (parameters or {}).items():
@@ -379,11 +378,11 @@ class Client(Participant):
         message.header.stamp = time_of(stamp)
         self._stem.publish(message)
 
-    def send(self, pressure=None, position=None, may_send=lambda _: True):
+    def send(self, pressure=None, position=None):
         """Publish samples (stamps, values) of either signal or both, in the order of time.
 
         They go in bursts that no queue of the transport is overrun by, each once the one before
-        has been acknowledged. `may_send(count)` holds the next burst back after `count` messages.
+        has been acknowledged.
         """
         events = sorted(
             (int(stamp), publish is self.send_stem, float(value), publish)
@@ -393,9 +392,6 @@ class Client(Participant):
         )
         publishers = [publisher for publisher in (self._pressure, self._stem) if publisher]
         for begin in range(0, len(events), _BURST):
-            self.wait_until(
-                lambda sent=begin: may_send(sent), f"room for more than {begin} messages"
-            )
             for stamp, _, value, publish in events[begin : begin + _BURST]:
                 publish(stamp, value)
             for publisher in publishers:
@@ -405,16 +401,6 @@ class Client(Participant):
         """Publish both signals of `record` at its own stamps, the first at `start` ns."""
         stamps = stamps_of(record, start)
         self.send((stamps, record.pressure), (stamps, record.position))
-
-    def send_without_loss(self, pressure, position):
-        """Publish long signals to the identifier, whose empty buffer then holds all of them."""
-
-        def has_room(sent):
-            taken = buffered(self.statuses[-1][1]) if self.statuses else 0
-            return sent < _AHEAD + taken
-
-        self.send(pressure, position, has_room)
-        self.wait_for_buffered(len(pressure[0]) + len(position[0]))
 
     # Parameters
 

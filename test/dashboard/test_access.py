@@ -7,20 +7,148 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Where a dashboard listens without accounts, how often one may try, how long a session lasts."""
+"""Who may come in: accounts and their hashes, where a dashboard listens, tries and sessions."""
 
 import asyncio
+import hashlib
 import json
+import re
 import shutil
 import subprocess
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from local_server import certificate_pair
 from quick_accounts import PASSWORD, quick_account, quick_hash
 
-from valve_friction_ros.dashboard.accounts import Access, Account, HashedPassword, Role
+from valve_friction_ros.dashboard.accounts import (
+    SHORTEST,
+    VARIABLE,
+    Access,
+    Account,
+    HashedPassword,
+    Role,
+    accounts_from,
+)
 from valve_friction_ros.dashboard.gate import host_of, is_own_origin, own_path
 from valve_friction_ros.dashboard.log_in import AttemptLimit, LogIn, Refusal, Sessions
+
+
+def test_a_new_hash_is_the_documented_scrypt():
+    made = HashedPassword.of("päßwörd of Anna")
+    assert re.fullmatch(r"scrypt:14:8:5:[\w-]{22}:[\w-]{43}", str(made))
+    assert made.digest == hashlib.scrypt(
+        "päßwörd of Anna".encode(), salt=made.salt, n=2**14, r=8, p=5, maxmem=2**26, dklen=32
+    )
+    assert made.matches("päßwörd of Anna")
+    assert made.matches(
+        "pa\u0308ßwo\u0308rd of Anna"
+    )  # the same letters, as another keyboard has it
+    assert not made.matches("paßwörd of Anna")
+
+
+def test_the_same_password_never_has_the_same_hash():
+    assert str(quick_hash()) != str(quick_hash())
+
+
+@given(st.text(min_size=1, max_size=40), st.text(min_size=1, max_size=40))
+def test_only_the_password_matches(one, other):
+    import unicodedata
+
+    equal = unicodedata.normalize("NFKC", one) == unicodedata.normalize("NFKC", other)
+    assert HashedPassword.read(str(quick_hash(one))).matches(other) == equal
+
+
+@pytest.mark.parametrize("length", [SHORTEST - 1, 201])
+def test_lengths_that_are_refused(length):
+    with pytest.raises(ValueError, match="10 to 200 characters"):
+        HashedPassword.of("x" * length)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        ("scrypt", "bcrypt"),
+        (":10:", ":9:"),
+        (":10:", ":21:"),  # 8 GiB a try
+        (":10:", ":x:"),
+        (":1:1:", ":1:"),
+        (":1:1:", ":1:17:"),
+        -1,  # cut off
+        -5,
+        -43,
+    ],
+)
+def test_hashes_that_are_refused(change):
+    text = str(quick_hash())
+    wrong = text.replace(*change, 1) if isinstance(change, tuple) else text[:change]
+    with pytest.raises(ValueError, match="no usable hash") as raised:
+        HashedPassword.read(wrong)
+    assert text[-20:] not in str(raised.value)
+
+
+def test_no_secret_in_what_is_shown():
+    account = quick_account()
+    for part in str(account.password).split(":")[-2:]:
+        assert part not in repr(account)
+    assert repr(account.password.digest) not in repr(account)
+
+
+def write(path, text, mode=0o600):
+    path.write_text(text)
+    path.chmod(mode)
+    return path
+
+
+def test_accounts_of_a_file(tmp_path):
+    anna, bo = quick_account(), quick_account("bo@plant", Role.VIEW)
+    file = write(tmp_path / "accounts", f"# who may\n\n{anna}\n{bo}\n")
+    assert accounts_from(file, {}) == (anna, bo)
+    assert accounts_from(None, {VARIABLE: f"{anna};{bo}"}) == (anna, bo)
+    assert accounts_from(None, {}) == ()
+    assert accounts_from(None, {VARIABLE: " "}) == ()
+
+
+@pytest.mark.parametrize("mode", [0o644, 0o604, 0o660, 0o602, 0o640, 0o610])
+def test_a_file_that_others_can_read_is_refused(tmp_path, mode):
+    file = write(tmp_path / "accounts", f"{quick_account()}\n", mode)
+    with pytest.raises(ValueError, match=f"open to others: run `chmod 600 {file}`"):
+        accounts_from(file, {})
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("{anna}\n{anna}", "line 2: 'anna' is there twice"),
+        ("anna operate", "line 1: not NAME, role"),
+        ("anna admin {hash}", "line 1: not NAME, role"),
+        ("an/na view {hash}", "line 1: the name of an account"),
+        ("anna view plaintext-password", "line 1: no usable hash"),
+        ("# nobody", "holds no account"),
+        ("", "holds no account"),
+    ],
+)
+def test_wrong_files(tmp_path, text, words):
+    anna = quick_account()
+    file = write(tmp_path / "accounts", text.format(anna=anna, hash=anna.password))
+    with pytest.raises(ValueError, match=words) as raised:
+        accounts_from(file, {})
+    assert "plaintext" not in str(raised.value)
+    assert str(anna.password) not in str(raised.value)
+
+
+def test_two_sources_are_refused(tmp_path):
+    file = write(tmp_path / "accounts", f"{quick_account()}\n")
+    with pytest.raises(ValueError, match="give one of them"):
+        accounts_from(file, {VARIABLE: str(quick_account())})
+
+
+def test_a_line_is_read_as_it_was_written():
+    account = quick_account("bo", Role.VIEW)
+    assert Account.read(str(account)) == account
+    assert account.password.matches(PASSWORD)
+
 
 ANNA = quick_account()
 
@@ -109,35 +237,30 @@ def test_names_that_an_open_dashboard_answers_to():
     assert not access.answers_to(host_of("rebound.example"), "10.0.0.5")
 
 
+HERE, THERE = "127.0.0.1:8080", "valves.example"
+
+
 @pytest.mark.parametrize(
-    ("origin", "is_own"),
+    ("origin", "called", "is_encrypted", "is_own"),
     [
-        (None, True),
-        ("http://127.0.0.1:8080", True),
-        ("https://127.0.0.1:8080", True),
-        ("http://127.0.0.1:8081", False),
-        ("http://127.0.0.1", False),
-        ("http://evil.example", False),
-        ("http://127.0.0.1:8080@evil.example", False),
-        ("null", False),
-        ("", False),
-        ("http://[", False),
+        (None, HERE, False, True),
+        (f"http://{HERE}", HERE, False, True),
+        (f"https://{HERE}", HERE, False, True),
+        ("http://127.0.0.1:8081", HERE, False, False),
+        ("http://127.0.0.1", HERE, False, False),
+        ("http://evil.example", HERE, False, False),
+        (f"http://{HERE}@evil.example", HERE, False, False),
+        (f"ftp://{HERE}", HERE, False, False),
+        ("null", HERE, False, False),
+        ("", HERE, False, False),
+        ("http://[", HERE, False, False),
+        (None, THERE, True, True),
+        (f"https://{THERE}", THERE, True, True),
+        (f"http://{THERE}", THERE, True, False),
     ],
 )
-def test_origins(origin, is_own):
-    assert is_own_origin(origin, "127.0.0.1:8080") == is_own
-
-
-@pytest.mark.parametrize(
-    ("origin", "is_own"),
-    [(None, True), ("https://valves.example", True), ("http://valves.example", False)],
-)
-def test_with_a_certificate_an_origin_is_https(origin, is_own):
-    assert is_own_origin(origin, "valves.example", is_encrypted=True) == is_own
-
-
-def test_other_schemes_are_no_origin():
-    assert not is_own_origin("ftp://127.0.0.1:8080", "127.0.0.1:8080")
+def test_origins(origin, called, is_encrypted, is_own):
+    assert is_own_origin(origin, called, is_encrypted=is_encrypted) == is_own
 
 
 def test_sessions_go_on_in_memory_where_they_cannot_be_kept(tmp_path):
@@ -153,27 +276,12 @@ def test_sessions_go_on_in_memory_where_they_cannot_be_kept(tmp_path):
     assert "No such file or directory" in lines[0]
 
 
-WAYS_OUT = [
-    "//evil.example",
-    "https://evil.example",
-    "/\\evil.example",
-    "\\\\evil",
-    "/\t/evil.example",
-    "/a\nb",
-    "javascript:x",
-    "",
-]
-
-
-@pytest.mark.parametrize("text", WAYS_OUT)
-def test_no_way_out_by_the_log_in(text):
-    assert own_path(text) == "/"
-
-
-def test_a_page_is_gone_back_to():
-    assert own_path("/valve?node=/fv_101/identifier&zone=UTC") == (
-        "/valve?node=/fv_101/identifier&zone=UTC"
-    )
+def test_no_way_out_by_the_log_in():
+    page = "/valve?node=/fv_101/identifier&zone=UTC"
+    assert own_path(page) == page
+    for text in ("//evil.example", "https://evil.example", "/\\evil.example", "\\\\evil",
+                 "/\t/evil.example", "/a\nb", "javascript:x", ""):  # fmt: skip
+        assert own_path(text) == "/"
 
 
 def test_a_limit_slides():

@@ -7,29 +7,139 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The evidence of an identifier: combined in a thread, watched, and shown."""
+"""The moves in service as a node keeps them: a wrong clock, and what combines them in a thread."""
 
-import os
 import sqlite3
-import subprocess
-import sys
 import threading
 import time
 from types import SimpleNamespace
 
 import pytest
-from service import START, made_moves
+from histories import VALVE
+from service import SECOND, START, made_moves
 from service import VALVE as BUILT
-from test_move_ledger import HOUR, Bench
+from waiting import PATIENCE, wait_until
 
+from valve_friction_ros.evidence import Move
 from valve_friction_ros.health import FrictionMonitor, MonitorSettings
+from valve_friction_ros.history import HistoryFile, read_change, read_moves, read_reference
 from valve_friction_ros.identification import IdentificationSettings, RefusalError
 from valve_friction_ros.nodes.identifier import evidence_watch
+from valve_friction_ros.nodes.identifier.evidence_watch import MoveLedger
 from valve_friction_ros.nodes.identifier.node import Identifier
 from valve_friction_ros.nodes.identifier.workers import Workers
 from valve_friction_ros.nodes.plumbing.worker import Worker
 
-PATIENCE = 60.0
+HOUR, YEAR = 3600 * SECOND, 365 * 86_400 * SECOND
+PERIOD = 12 * SECOND
+
+
+def move(begin):
+    return Move(begin, begin + SECOND, 1e-3, 2e-3, 500.0, 10.0, 1e-3)
+
+
+class Bench:
+    """A ledger without a graph; each move comes a second after its end, by the true time."""
+
+    def __init__(self, path, is_played=False):
+        self.file, self.true, self.error, self.log = HistoryFile(path), START, 0, []
+        clock = SimpleNamespace(
+            now=lambda: SimpleNamespace(nanoseconds=self.true + self.error),
+            ros_time_is_active=is_played,
+        )
+        self.node = SimpleNamespace(
+            get_clock=lambda: clock,
+            get_logger=lambda: SimpleNamespace(warning=self.log.append, error=self.log.append),
+            get_parameter=lambda _: SimpleNamespace(value=0.0),
+        )
+        self.history = SimpleNamespace(
+            valve=VALVE,
+            moves=lambda: read_moves(self.file, VALVE.name, BUILT),
+            reference=lambda: read_reference(self.file, VALVE.name, BUILT),
+            change=lambda: read_change(self.file, VALVE.name, BUILT),
+            keep_soon=lambda change: change(self.file),
+        )
+        self.file.prepare()
+        self.start()
+
+    def start(self):
+        self.ledger = MoveLedger(self.node, self.history, BUILT)
+
+    def serve(self, count):
+        for _ in range(count):
+            self.true += PERIOD
+            begin = self.true + self.error - 2 * SECOND
+            self.ledger.add([move(begin)])
+
+    def kept(self):
+        self.ledger.close()
+        return read_moves(self.file, VALVE.name, BUILT)
+
+
+@pytest.mark.parametrize("ahead", [HOUR, 3 * YEAR])
+@pytest.mark.parametrize("restarts", [False, True])
+def test_a_clock_that_is_set_back_costs_no_later_move(tmp_path, ahead, restarts):
+    bench = Bench(tmp_path / "history.sqlite")
+    bench.serve(10)
+    before = bench.kept()
+    bench.error = ahead
+    bench.serve(20)
+    if restarts:
+        assert len(bench.kept()) == 30
+        bench.start()
+    bench.error = 0
+    bench.serve(7)
+    assert len(bench.ledger.moves) == 30
+    assert "before those that are kept" in bench.ledger.problem
+    bench.serve(33)
+    assert bench.ledger.problem == ""
+    assert bench.ledger.left_out == 0
+    found = bench.ledger.moves
+    assert found[:10] == before
+    assert [one.begin for one in found] == sorted(one.begin for one in found)
+    assert len(found) == 50
+    assert found[-1].end < bench.true
+    assert bench.kept() == found
+    assert any("the clock was ahead" in one and "20 kept moves" in one for one in bench.log)
+
+
+def test_a_clock_that_is_not_set_yet_costs_no_kept_move(tmp_path):
+    """A machine that begins hours behind, until it asks for the time."""
+    bench = Bench(tmp_path / "history.sqlite")
+    bench.serve(20)
+    bench.error = -HOUR
+    bench.serve(5)
+    bench.error = 0
+    bench.serve(10)
+    assert len(bench.ledger.moves) == 30
+    assert bench.ledger.left_out == 5
+
+
+def test_a_stray_stamp_is_no_problem_and_an_hour_of_them_is(tmp_path):
+    """Sensors that are an hour behind, and a node whose clock is right."""
+    bench = Bench(tmp_path / "history.sqlite")
+    bench.serve(20)
+    bench.ledger.add([move(START - HOUR)])
+    assert bench.ledger.problem == ""
+    assert bench.ledger.left_out == 1
+    for number in range(30):
+        bench.ledger.add([move(START - HOUR + number * PERIOD)])
+    assert "the latest 31 moves in service are left out" in bench.ledger.problem
+    assert "check the clocks" in bench.ledger.problem
+    assert len(bench.ledger.moves) == 20
+    bench.serve(1)
+    assert bench.ledger.problem == ""
+
+
+def test_a_recording_that_is_played_costs_no_kept_move(tmp_path):
+    bench = Bench(tmp_path / "history.sqlite", is_played=True)
+    bench.serve(20)
+    bench.error = -HOUR
+    bench.serve(20)
+    assert len(bench.ledger.moves) == 20
+    assert "a recording that is played" in bench.ledger.problem
+
+
 EXACT = IdentificationSettings(timing_uncertainty=0.005)
 
 
@@ -100,9 +210,7 @@ def test_a_packing_that_is_renewed_meanwhile_has_no_baseline(bench):
 
 def settled(bench):
     """Show the values once the thread has nothing to do."""
-    deadline = time.monotonic() + PATIENCE
-    while bench.worker.is_busy and time.monotonic() < deadline:
-        time.sleep(0.01)
+    wait_until(lambda: not bench.worker.is_busy)
     return bench.watch.values()
 
 
@@ -156,16 +264,3 @@ def test_a_change_stays_when_the_moves_before_it_have_gone(bench):
     assert shown.items() <= bench.watch.values().items()
     bench.watch.renew()
     assert not any("change" in key for key in bench.watch.values())
-
-
-@pytest.mark.parametrize(("given", "used"), [({}, "1"), ({"OPENBLAS_NUM_THREADS": "3"}, "3")])
-def test_matrices_are_computed_in_one_thread(given, used):
-    code = (
-        "import os, sys, valve_friction_ros.nodes.start; "
-        "print(os.environ['OPENBLAS_NUM_THREADS'], 'numpy' in sys.modules)"
-    )
-    bare = {key: value for key, value in os.environ.items() if key != "OPENBLAS_NUM_THREADS"}
-    answer = subprocess.run(
-        [sys.executable, "-c", code], env=bare | given, capture_output=True, text=True, check=True
-    )
-    assert answer.stdout.split() == [used, "False"]

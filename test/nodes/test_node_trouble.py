@@ -7,15 +7,20 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""What neither a stranger's bytes nor a bug in one place may end."""
+"""What no node is ended by, and what ends it: bugs, damaged messages, Ctrl-C amid work."""
 
+import numpy as np
 import pytest
-import raising_identifier
 from diagnostic_msgs.msg import DiagnosticStatus
-from live_nodes import NAMESPACE, values_of
-from raising_identifier import LOOP, TIMER
-from records import quick_record
+from faulty_identifier import BEGINNING, FINISH, LOOP, MENDED, RAISE, TIMER, faulty
+from live_nodes import NAMESPACE, buffered, stamps_of, values_of
+from records import quick_record, simulated
 from sensor_msgs.msg import FluidPressure, JointState
+from std_srvs.srv import Trigger
+
+from valve_friction_ros.history import HistoryFile
+from valve_friction_ros.identification import published_estimate
+from valve_friction_ros.model import BENCH_VALVE, Recording, SineWave
 
 DAMAGED = b"\x00\x01\x00\x00xx"
 
@@ -40,10 +45,10 @@ def test_a_damaged_message_costs_only_itself(live, kind, topic):
 
 
 def started(live, tmp_path, where):
-    process = live.start("identifier", script=raising_identifier.SCRIPT)
+    process = live.start("identifier", script=faulty("raising"))
     live.client.next_status()
     (tmp_path / "draft").write_text(where)
-    (tmp_path / "draft").rename(tmp_path / raising_identifier.RAISE)
+    (tmp_path / "draft").rename(tmp_path / RAISE)
     return process
 
 
@@ -57,7 +62,7 @@ def test_a_bug_is_an_error_and_the_node_lives_on(live, tmp_path, where):
     assert values_of(status)["NE 107"] == "C"
     live.client.next_status()
     assert process.errors.count("Traceback") == 1  # not at each turn
-    (tmp_path / raising_identifier.RAISE).unlink()
+    (tmp_path / RAISE).unlink()
     status = live.client.next_status(lambda one: "a bug" not in one.message, "its end")
     assert status.level < b"\x02"
 
@@ -119,25 +124,25 @@ class TestOneOfSeveral:
 
     def test_that_fails_while_it_runs(self, live, tmp_path):
         """At its start already, then in its diagnostics; each time the others go on."""
-        script = raising_identifier.SEVERAL
+        script = faulty("one_raising")
         process = self.start(live, tmp_path, "", script)
         process.forgive_tracebacks()
         self.require_others(live.client, self.statuses(live.client))
         for where in (LOOP, TIMER):
             (tmp_path / "draft").write_text(where)
-            (tmp_path / "draft").rename(tmp_path / raising_identifier.RAISE)
+            (tmp_path / "draft").rename(tmp_path / RAISE)
             status = live.client.next_status(lambda one: "a bug" in one.message, "the bug")
             assert status.name == "/fv_102/identifier: friction"
             assert status.level == b"\x02"
             self.require_others(live.client, self.statuses(live.client))
-        (tmp_path / raising_identifier.RAISE).unlink()
+        (tmp_path / RAISE).unlink()
         live.client.next_status(
             lambda one: one.name.startswith("/fv_102") and one.level < b"\x02", "its end"
         )
 
     def test_a_bug_at_the_start(self, live, tmp_path):
-        (tmp_path / raising_identifier.RAISE).write_text(raising_identifier.BEGINNING)
-        process = self.start(live, tmp_path, "", raising_identifier.SEVERAL)
+        (tmp_path / RAISE).write_text(BEGINNING)
+        process = self.start(live, tmp_path, "", faulty("one_raising"))
         process.forgive_tracebacks()
         found = self.statuses(live.client)
         status = found["/fv_102/identifier: friction"]
@@ -145,21 +150,97 @@ class TestOneOfSeveral:
         assert "nobody watches this valve: internal error: ZeroDivisionError" in status.message
         self.require_others(live.client, found)
 
-    def test_none_can_start(self, live, tmp_path):
-        process = self.start_alone(live, tmp_path)
-        assert process.exit_code() == 2
-        (line,) = process.errors.splitlines()
-        told = "identifier: travel must be above zero, got -1"
-        assert line == f"cannot start: {'; '.join(f'/fv_10{n}/{told}' for n in (1, 2, 3))}"
 
-    def start_alone(self, live, tmp_path):
-        config = tmp_path / "valves.yaml"
-        config.write_text(
-            "/**:\n  ros__parameters:\n    travel: -1.0\n"
-            "/identifiers:\n  ros__parameters:\n    valves: [fv_101, fv_102, fv_103]\n"
-        )
-        arguments = ["--params-file", str(config)]
-        process = live.start("identifiers", arguments=arguments, namespace=None)
-        live.client.watched.clear()
-        live.nodes.remove(process)
-        return process
+IDENTIFY = f"{NAMESPACE}/identifier/identify"
+OK, ERROR = b"\x00", b"\x02"
+
+
+def nodes_of(client):
+    """Names of the nodes in the valve's namespace."""
+    found = client.node.get_node_names_and_namespaces()
+    return {name for name, namespace in found if namespace == NAMESPACE}
+
+
+def begin_identification(client):
+    """Request an identification, and return its future once it is under way."""
+    running = client.request(Trigger, IDENTIFY, Trigger.Request())
+    second = client.call(Trigger, IDENTIFY, Trigger.Request())
+    assert not second.success
+    assert "already running" in second.message
+    assert not running.done()
+    return running
+
+
+def test_ctrl_c_during_an_identification(live, tmp_path):
+    process = live.start_identifier(script=faulty("slow"))
+    client = live.client
+    client.send_record(quick_record())
+    client.wait_for_buffered(1000)
+    begin_identification(client)
+    client.watched.remove(process)
+    process.interrupt()
+    client.wait_until(lambda: "identifier" not in nodes_of(client), "the end of the node")
+    (tmp_path / FINISH).touch()
+    process.require_good_end()
+
+
+def test_long_identification_loses_no_sample(live, tmp_path):
+    """What arrives while an identification runs is taken at once, and identified by the next."""
+    live.start_identifier({"method": "bench"}, script=faulty("slow"))
+    client = live.client
+    whole = simulated(SineWave(period=5.0).sample(np.arange(1000) / 100), 0.01)
+    begin, rest = slice(500), slice(500, 1000)
+    stamps = stamps_of(whole)
+    client.send(*((stamps[begin], signal[begin]) for signal in (whole.pressure, whole.position)))
+    client.wait_for_buffered(1000)
+    running = begin_identification(client)
+    client.send(*((stamps[rest], signal[rest]) for signal in (whole.pressure, whole.position)))
+    client.next_status(lambda status: buffered(status) == 2000, "all samples")
+    assert not running.done()
+
+    (tmp_path / FINISH).touch()
+    response = client.wait_until_answered(running)
+    assert response.success, response.message
+    half = published_estimate(
+        Recording(0.01, whole.pressure[begin], whole.position[begin]), BENCH_VALVE
+    )
+    assert client.friction("sigma") == {"sigma": half.sigma}
+    assert client.trigger("identify").success
+    sigma = published_estimate(whole, BENCH_VALVE).sigma
+    assert sigma != half.sigma
+    assert client.friction("sigma") == {"sigma": sigma}
+
+
+def test_a_bug_is_an_internal_error_and_the_next_record_identifies(live, tmp_path):
+    history = HistoryFile(tmp_path / "valve_friction_ros" / "history.sqlite")
+    process = live.start_identifier(script=faulty("failing"))
+    client = live.client
+    client.send_record(quick_record())
+    client.wait_for_buffered(1000)
+    response = client.trigger("identify")
+    assert not response.success
+    words = "internal error: ZeroDivisionError: nobody foresaw it (faulty_identifier.py, line "
+    assert response.message.startswith(words)
+    assert response.message.endswith("): report it, with what ~/save writes")
+
+    status = client.next_status()
+    assert status.level == ERROR
+    assert status.message.startswith(words)
+    values = values_of(status)
+    assert values["NE 107"] == "C"
+    assert values["estimate_valid"] == "false"
+    assert values["reason"] == response.message
+    assert "[ERROR]" in process.errors
+    assert process.errors.count("Traceback (most recent call last)") == 1
+    assert 'raise ZeroDivisionError("nobody\\nforesaw it")' in process.errors
+
+    # The same bug again is not logged again.
+    assert client.trigger("identify").message == response.message
+    assert process.errors.count("Traceback (most recent call last)") == 1
+    assert history.entries() == ()
+
+    (tmp_path / MENDED).touch()
+    client.identified_whole(1000)
+    assert client.next_status().level == OK
+    assert all(not entry.refusal for entry in history.entries())
+    process.forgive_tracebacks()

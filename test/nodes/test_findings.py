@@ -1,0 +1,401 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""What an identifier finds of the friction and of the whole valve, against a baseline, over DDS."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from live_nodes import NAMESPACE, SECOND, START, values_of
+from records import quick_record, simulated, square_record, stroked_record
+
+from valve_friction_ros.health import Baseline
+from valve_friction_ros.identification import identify
+from valve_friction_ros.model import BENCH_VALVE, HIGH_FRICTION, LOW_FRICTION, SensorNoise
+
+NODE = f"{NAMESPACE}/identifier"
+OK, WARN, ERROR = b"\x00", b"\x01", b"\x02"
+LIMITS = {"warn_ratio": 1.5, "error_ratio": 2.0, "low_ratio": 0.5}
+
+
+@pytest.fixture(scope="module")
+def healthy(shared):
+    """An identifier whose baseline is its own estimate of the healthy valve."""
+    shared.start_identifier()
+    client = shared.client
+    refused = client.trigger("set_baseline")
+    client.identified(quick_record())
+    accepted = client.trigger("set_baseline")
+    return client, refused, accepted
+
+
+@pytest.fixture
+def client(healthy):
+    client, *_ = healthy
+    assert client.set_together(NODE, LIMITS).successful
+    return client
+
+
+def valve_with(coulomb_friction):
+    return replace(
+        LOW_FRICTION, coulomb_friction=coulomb_friction, static_friction=coulomb_friction
+    )
+
+
+def test_baseline_needs_an_estimate(healthy):
+    _, refused, accepted = healthy
+    assert not refused.success
+    assert "the valve has no result" in refused.message
+    assert accepted.success
+    result = identify(quick_record(), BENCH_VALVE)
+    taken = "by the identification of 2023-11-14 22:13 UTC"
+    assert accepted.message == f"baseline: {Baseline.of(result)}; before: none ({taken})"
+    healthy = result.parameters["coulomb_friction"]
+    assert healthy.interval[0] < 152.7 < healthy.interval[1]
+
+
+@pytest.mark.parametrize(
+    ("parameters", "ratio", "level", "signal", "words"),
+    [
+        (HIGH_FRICTION, None, ERROR, "F", "excess friction"),
+        (valve_with(0.3 * 152.7), 0.3, ERROR, "S", "friction collapsed"),
+        (valve_with(1.7 * 152.7), 1.7, WARN, "M", "friction has grown"),
+        (valve_with(1.2 * 152.7), 1.2, OK, "", "friction normal"),
+    ],
+    ids=["tightened", "worn", "growing", "healthy"],
+)
+def test_verdict(client, parameters, ratio, level, signal, words):
+    """More dry friction alone shows in F_c; ten times the viscous friction in both together."""
+    message = client.identified(quick_record(parameters))
+    status = client.statuses[-1][1]
+    assert status.level == level
+    assert words in status.message
+    assert status.message == message
+    values = values_of(status)
+    of = values["friction_ratio of"]
+    if ratio is None:
+        speed = float(values["baseline_sliding_friction speed [m/s]"])
+        told = f"sliding friction at {speed * 1e3:.2g} mm/s"
+        assert of == "sliding_friction"
+        tight, loose = (float(one.sliding_friction(speed)) for one in (parameters, LOW_FRICTION))
+        ratio = tight / loose
+    else:
+        told = "coulomb friction"
+        assert of == "coulomb_friction"
+    assert f"{told} is {float(values['friction_ratio']):.2f} (" in status.message
+    assert values["NE 107"] == signal
+    # With more friction the stem is slower, and between two speeds friction may have fallen.
+    near = 2e-3 if of == "coulomb_friction" else 2e-2
+    assert float(values["friction_ratio"]) == pytest.approx(ratio, rel=near)
+    assert float(values["baseline_coulomb_friction [N]"]) == pytest.approx(152.7, rel=1e-3)
+    low, high = (float(values[f"friction_ratio {end}"]) for end in ("low", "high"))
+    assert low <= ratio <= high
+    published = client.friction("friction_ratio")["friction_ratio"]
+    assert published == pytest.approx(float(values["friction_ratio"]), rel=1e-8)
+
+
+def test_limits_are_parameters_and_judge_at_once(client):
+    client.identified(quick_record(HIGH_FRICTION))
+    assert client.statuses[-1][1].level == ERROR
+    for limits, level in (
+        ({"error_ratio": 8.0, "viscous_factor": 100.0}, WARN),
+        ({"warn_ratio": 7.5}, OK),
+        ({"warn_ratio": 1.1, "error_ratio": 1.2}, ERROR),
+    ):
+        assert client.set_together(NODE, limits).successful
+        client.next_status(lambda status, wanted=level: status.level == wanted, str(level))
+
+
+def test_parameter_shows_the_baseline_of_the_service_and_replaces_it(live):
+    live.start_identifier()
+    client = live.client
+    client.identified(quick_record())
+    assert client.trigger("set_baseline").success
+    (shown,) = client.parameters(NODE, "baseline_coulomb_friction")
+    told = float(client.last_values()["baseline_coulomb_friction [N]"])
+    assert shown == pytest.approx(told, rel=1e-8)
+    assert float(client.last_values()["baseline half width [N]"]) > 0
+
+    assert client.set_together(NODE, {"baseline_coulomb_friction": 100.0}).successful
+    values = client.status_values(
+        lambda status: values_of(status)["baseline_coulomb_friction [N]"] == "100", "100 N"
+    )
+    assert values["baseline half width [N]"] == "0"
+    assert client.set_together(NODE, {"baseline_coulomb_friction": math.nan}).successful
+    client.next_status(
+        lambda status: "baseline_coulomb_friction [N]" not in values_of(status), "no baseline"
+    )
+
+
+SQUARE = square_record()
+
+
+def test_an_alarm_by_the_sliding_friction_where_the_coulomb_friction_is_vague(live):
+    """A square wave behind a lag: F_c is weak, and the sliding friction serves instead."""
+    live.start_identifier({"timing_uncertainty": 0.02})
+    client = live.client
+    client.identified(SQUARE)
+    values = client.last_values()
+    assert values["coulomb_friction verdict"] == "weak"
+    assert client.trigger("set_baseline").success
+    known = float(client.last_values()["baseline_sliding_friction [N]"])
+    grown = replace(
+        HIGH_FRICTION,
+        coulomb_friction=1.6 * HIGH_FRICTION.coulomb_friction,
+        static_friction=1.6 * HIGH_FRICTION.static_friction,
+        viscous_friction=1.6 * HIGH_FRICTION.viscous_friction,
+    )
+    client.identified(square_record(grown))
+    status = client.statuses[-1][1]
+    assert status.level == WARN
+    values = values_of(status)
+    assert values["friction_ratio of"] == "sliding_friction"
+    assert "friction has grown: sliding friction at " in status.message
+    low, high = (float(values[f"friction_ratio {end}"]) for end in ("low", "high"))
+    assert 1.25 < low < 1.6 < high
+    assert float(client.friction("friction_ratio")["friction_ratio"]) == pytest.approx(
+        float(values["friction_ratio"])
+    )
+    assert known == pytest.approx(float(values["baseline_sliding_friction [N]"]))
+
+
+NARROW = {"warn_ratio": 1.25, "error_ratio": 1.5, "low_ratio": 0.5}
+
+
+def record_of(share):
+    """A record of the bench valve whose friction is so many times the usual one."""
+    names = ("coulomb_friction", "static_friction", "viscous_friction")
+    friction = {name: share * getattr(LOW_FRICTION, name) for name in names}
+    return quick_record(replace(LOW_FRICTION, **friction))
+
+
+HEALTHY, TIGHT, LOOSE = quick_record(), quick_record(HIGH_FRICTION), record_of(0.6)
+UNSURE = SensorNoise(15e-5, 300.0, seed=1).applied_to(record_of(1.42))
+
+
+def test_an_alarm_ends_by_a_sure_result_only_also_over_a_restart(live):
+    node = live.start_identifier(NARROW)
+    client = live.client
+
+    def status_after(record):
+        client.identified(record)
+        return client.statuses[-1][1]
+
+    status_after(HEALTHY)
+    assert client.trigger("set_baseline").success
+    assert status_after(TIGHT).level == ERROR
+
+    unsure = status_after(UNSURE)
+    values = values_of(unsure)
+    low, high = (float(values[f"friction_ratio {end}"]) for end in ("low", "high"))
+    assert low < NARROW["warn_ratio"] < NARROW["error_ratio"] < high
+    assert (unsure.level, values["NE 107"]) == (ERROR, "F")
+    assert unsure.message.startswith("excess friction: ")
+    assert "the latest record does not clear it: friction has grown: " in unsure.message
+    live.kill(node)
+
+    live.start_identifier(NARROW)
+    assert client.next_status().level == ERROR
+    status = status_after(HEALTHY)
+    assert (status.level, values_of(status)["NE 107"]) == (OK, "")
+
+    status = status_after(UNSURE)  # without an alarm before it: grown, not surely excessive
+    assert (status.level, values_of(status)["NE 107"]) == (WARN, "M")
+    assert status.message.startswith("friction has grown: ")
+
+    status = status_after(LOOSE)
+    assert (status.level, values_of(status)["NE 107"]) == (WARN, "M")
+    assert status.message.startswith("friction has fallen: ")
+
+
+HEALTHY = quick_record()
+SOFT = replace(LOW_FRICTION, spring_constant=LOW_FRICTION.spring_constant * 2 / 3)
+WEAK = quick_record(SOFT)
+HARDLY = SensorNoise(3e-5, 300.0, 3).applied_to(
+    simulated(5e4 + 5e3 * np.sin(2 * np.pi * np.arange(500) / 250), 0.01, SOFT)
+)
+"""Small strokes of the valve of the soft spring, which hardly show it."""
+CHANGE = "spring_constant change [%]"
+
+
+def test_a_lost_spring_is_said_and_outlives_a_record_that_hardly_shows_it_and_a_kill(live, history):
+    node = live.start_identifier()
+    client = live.client
+    client.identified(HEALTHY)
+    assert CHANGE not in values_of(client.statuses[-1][1])
+    assert client.trigger("set_baseline").success
+    status = client.next_status(lambda one: CHANGE in values_of(one), "the change")
+    assert status.level == OK
+    assert float(values_of(status)[CHANGE]) == 0.0
+
+    assert "the spring constant has changed" in client.identified(WEAK)
+    status = client.statuses[-1][1]
+    values = values_of(status)
+    assert status.level == ERROR
+    assert values["NE 107"] == "F"
+    assert "the spring constant has changed: 0.667 times" in status.message
+    assert float(values[CHANGE]) == pytest.approx(-100 / 3, abs=0.1)
+    low, high = (float(values[f"spring_constant change {end} [%]"]) for end in ("low", "high"))
+    assert low < -100 / 3 < high
+    kept = history.baseline(NODE).baseline
+    assert kept.numbers["spring_constant"].value == pytest.approx(
+        LOW_FRICTION.spring_constant, 1e-3
+    )
+
+    refused = client.trigger("set_baseline")
+    assert not refused.success
+    assert "the spring constant has changed" in refused.message
+
+    client.identified(HARDLY)
+    assert "spring_constant" not in history.last_success(NODE).numbers
+    live.kill(node)
+    live.start_identifier()
+    after = client.next_status(lambda one: CHANGE in values_of(one), "the change after a restart")
+    for one in (status, after):
+        assert one.level == ERROR
+        assert "the spring constant has changed: 0.667 times" in one.message
+    assert "no record since shows it)" in after.message
+    assert values_of(after)[CHANGE] == values[CHANGE]
+
+
+@pytest.mark.parametrize("is_scheduled", [False, True])
+def test_lost_travel_is_said_though_its_record_is_refused(live, history, is_scheduled):
+    """A sixth of the travel is lost: no model follows the record, but the stem's end is seen."""
+    node = live.start_identifier()
+    client = live.client
+    client.identified(stroked_record())
+    assert client.trigger("set_baseline").success
+    assert client.next_status().level == OK
+    if is_scheduled:
+        client.set_parameters(NODE, {"period": 0.5})
+    assert client.trigger("clear").success
+    lost = stroked_record(0.16 * BENCH_VALVE.travel)
+    client.send_record(lost, START + 60 * SECOND)
+    client.wait_for_buffered(2 * len(lost))
+    words = "travel is lost at its lower end: the stem stops +4.57 mm"
+    if not is_scheduled:
+        answer = client.trigger("identify")
+        assert not answer.success
+        assert "no friction model reproduces the record" in answer.message
+        assert words in answer.message
+    status = client.next_status(lambda one: words in one.message, "the lost travel")
+    assert (status.level, values_of(status)["NE 107"]) == (WARN, "M")
+    assert ("was refused" in status.message) == (not is_scheduled)
+    assert float(values_of(status)["lower_stop change [m]"]) == pytest.approx(4.572e-3, abs=5e-5)
+    client.wait_until(lambda: history.entries()[-1].refusal, "the refusal in the history")
+    live.kill(node)
+    live.start_identifier()
+    after = client.next_status(lambda one: words in one.message, "the same after a restart")
+    assert after.level == WARN
+
+
+def test_a_restored_baseline_brings_all_its_numbers_back(live):
+    node = live.start_identifier({"baseline_in_alarm": True})
+    client = live.client
+    client.identified(HEALTHY)
+    assert client.trigger("set_baseline").success
+    client.identified(WEAK)
+    assert client.trigger("set_baseline").success
+    assert client.next_status(lambda one: one.level == OK, "another baseline")
+    live.kill(node)
+
+    live.start_identifier({"baseline_in_alarm": True})
+    assert client.next_status(lambda one: CHANGE in values_of(one), "the kept one").level == OK
+    assert client.trigger("restore_baseline").success
+    status = client.next_status(lambda one: one.level == ERROR, "the first baseline")
+    assert "the spring constant has changed" in status.message
+
+
+def test_a_limit_is_a_parameter_and_a_given_friction_says_nothing_of_the_spring(live):
+    live.start_identifier({"spring_change": 0.5, "spring_failure": 0.6})
+    client = live.client
+    client.identified(HEALTHY)
+    assert client.trigger("set_baseline").success
+    client.identified(WEAK)
+    assert client.statuses[-1][1].level == OK
+    (refused,) = client.set_parameters(NODE, {"spring_change": 0.7})
+    assert "spring_change < spring_failure" in refused.reason
+    client.set_parameters(NODE, {"spring_change": 0.15})
+    client.next_status(lambda one: one.level == WARN, "a tighter limit")
+    client.set_parameters(NODE, {"baseline_coulomb_friction": 150.0})
+    status = client.next_status(lambda one: one.level == OK, "a friction alone")
+    assert CHANGE not in values_of(status)
+
+
+def still(place, pressures, begin):
+    """Stamps, pressures and positions: one of each in a second."""
+    stamps = START + begin * SECOND + SECOND * np.arange(len(pressures), dtype=np.int64)
+    return (stamps, np.array(pressures, dtype=float)), (stamps, np.full(len(pressures), place))
+
+
+def test_a_seized_stem_is_an_alarm_until_it_moves(live):
+    record = quick_record()
+    live.start_identifier({"window": 3600.0})
+    client = live.client
+    client.identified(record)
+    assert client.trigger("set_baseline").success
+    assert client.next_status().level == OK
+    middle = 0.5 * float(record.position.min() + record.position.max())
+    resting, supply = float(np.median(record.pressure)), float(record.pressure.max())
+    client.send(*still(middle, [*40 * [resting], *40 * [supply]], 60))
+    status = client.next_status(lambda one: one.level == ERROR, "a seized stem")
+    assert status.message.startswith(f"the stem has stood still at {1e3 * middle:.1f} mm since ")
+    values = values_of(status)
+    assert values["NE 107"] == "F"
+    assert values["standstill since [time]"].startswith("2023-11-14T22:14")
+    assert float(values["standstill static_friction at least [N]"]) > 2 * float(
+        values["coulomb_friction [N]"]
+    )
+    client.send(*still(1.2 * middle, 30 * [supply], 140))
+    status = client.next_status(lambda one: one.level == OK, "a stem that moves again")
+    assert "stood still" not in status.message
+
+
+UNSTATED = dict.fromkeys(
+    ("diaphragm_area", "pressure_reference", "travel", "pressure_minimum", "pressure_maximum")
+)
+
+
+def test_what_nobody_has_stated_is_said_until_somebody_does(live):
+    live.start_identifier(UNSTATED)
+    client = live.client
+    assert client.parameters(NODE, *UNSTATED) == [None] * len(UNSTATED)
+    client.identified(quick_record())
+    values = client.last_values()
+    assert values["assumed"] == ", ".join(UNSTATED)
+    assert "newtons are of an assumed area" in values["warnings"]
+    assert values["coulomb_friction verdict"] == "weak"
+    assert values["coulomb_friction reason"] == "of an assumed area"
+    assert client.trigger("set_baseline").success
+
+    stated = {"diaphragm_area": 0.0445, "pressure_reference": 41740.0, "travel": 0.028575}
+    assert client.set_together(NODE, stated).successful
+    client.identified(quick_record())
+    values = client.last_values()
+    assert values["assumed"] == "pressure_minimum, pressure_maximum"
+    assert values["coulomb_friction verdict"] == "identified"
+    assert float(values["friction_ratio"]) == 1.0
+
+
+def test_stated_data_are_compared_with_the_record(live):
+    """The file of a valve says it as the file of a command does."""
+    spring = LOW_FRICTION.spring_constant
+    live.start_identifier({"spring_constant": spring / 2, "mass": 1.542})
+    client = live.client
+    client.identified(quick_record())
+    values = client.last_values()
+    assert "N/m by the record and 102500 N/m as stated: check diaphragm_area" in values["warnings"]
+    assert values["coulomb_friction verdict"] == "weak"
+    assert client.set_together(NODE, {"spring_constant": spring}).successful
+    client.identified(quick_record())
+    values = client.last_values()
+    assert "as stated" not in values["warnings"]
+    assert values["coulomb_friction verdict"] == "identified"
