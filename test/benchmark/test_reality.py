@@ -16,7 +16,6 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from benchmark.reality.stamps import Stamping
 
 from benchmark.reality import package, records, trial
 from benchmark.reality.imperfections import (
@@ -33,7 +32,7 @@ from benchmark.reality.plants.kernel import GRID, Loop
 from benchmark.reality.plants.motion import Motion
 from benchmark.reality.records import Case, Nominal, Record, make_record
 from benchmark.reality.report import bounds, in_mode, is_useful, judged, report
-from benchmark.reality.sensors import Instruments, Sensor, Signal, measured
+from benchmark.reality.sensors import Instruments, Sensor, Signal, Stamping, measured
 from benchmark.reality.trial import Row, Task, tried
 from benchmark.reality.truth import TrueValue, truth_of
 from benchmark.reality.valves import DrawnValve, drawn_cylinder, drawn_valve
