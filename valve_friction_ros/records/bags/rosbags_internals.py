@@ -9,7 +9,7 @@
 
 """Messages of a bag, and private names of rosbags, which are in this file only.
 
-Checked with rosbags 0.11.9; `test_rosbags_internals.py` names what a newer version lacks.
+Checked with rosbags 0.11.9; `test_bags_of_valves.py` names what a newer version lacks.
 
 - `McapReader`: the documented `Reader` takes the format of a file from its ending, and refuses an
   MCAP file without index whose receive times go back, as those of several topics may.
