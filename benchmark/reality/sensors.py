@@ -23,28 +23,55 @@ from benchmark.reality.plants.motion import Motion
 
 @dataclass(frozen=True)
 class Stamping:
-    """The clock of one signal."""
+    """The clock of one signal.
 
-    rate: float = 1000.0  # samples a second
-    # Largest shift of an instant from its place, share of the period; the stamp is right.
+    Attributes
+    ----------
+    rate : float
+        Samples a second.
+    jitter : float
+        Largest shift of an instant from its place, share of the period; the stamp is right.
+    stamp_error : float
+        Largest error of a stamp, s, to either side, each for itself.
+    offset : float
+        Time by which the stamps are late, s.
+    drops : float
+        Share of the messages that are lost, each for itself.
+    bursts, burst : int and float
+        Number and length (s) of the pauses in which all messages are lost.
+    resolution : float
+        Step to which stamps are cut, s; 0: a nanosecond.
+    """
+
+    rate: float = 1000.0
     jitter: float = 0.0
-    stamp_error: float = 0.0  # largest error of a stamp, s, to either side, each for itself
-    offset: float = 0.0  # time by which the stamps are late, s
-    drops: float = 0.0  # share of the messages that are lost, each for itself
-    # Number and length (s) of the pauses in which all messages are lost.
+    stamp_error: float = 0.0
+    offset: float = 0.0
+    drops: float = 0.0
     bursts: int = 0
     burst: float = 0.0
-    resolution: float = 0.0  # step to which stamps are cut, s; 0: a nanosecond
+    resolution: float = 0.0
 
 
 class Times(NamedTuple):
-    """Instants of a signal."""
+    """Instants of a signal.
 
-    period: float  # nominal time between two samples, s
-    # When the samples were taken, s from the begin of the record, shape (n,).
+    Attributes
+    ----------
+    period : float
+        Nominal time between two samples, s.
+    taken : ndarray of float, shape (n,)
+        When the samples were taken, s from the begin of the record.
+    written : ndarray of float, shape (n,)
+        What the clock said then, s.
+    lost : ndarray of bool, shape (n,)
+        Whether the message is lost.
+    """
+
+    period: float
     taken: NDArray[np.float64]
-    written: NDArray[np.float64]  # what the clock said then, s, shape (n,)
-    lost: NDArray[np.bool_]  # whether the message is lost, shape (n,)
+    written: NDArray[np.float64]
+    lost: NDArray[np.bool_]
 
 
 def sampling_times(stamping: Stamping, duration: float, random: np.random.Generator) -> Times:

@@ -22,7 +22,7 @@ from pathlib import Path
 
 import pytest
 import waiting
-from full_history import BUILT, all_of, answer, fill, service_move
+from full_history import BUILT, all_of, answer, fill, filled, service_move
 from histories import DAY, OTHER, START, VALVE, make_version_5, refused, success
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -402,10 +402,7 @@ class TestAnotherMachine:
 
 @pytest.fixture
 def full(tmp_path):
-    full = HistoryFile(tmp_path / "history.sqlite")
-    fill(full)
-    fill(full, OTHER)
-    return full
+    return filled(tmp_path)
 
 
 @pytest.fixture(params=["file", "server"])

@@ -21,8 +21,8 @@ from pathlib import Path
 
 import pytest
 import sqlalchemy as sa
-from full_history import all_of, fill
-from histories import OTHER, START, VALVE, success
+from full_history import all_of, fill, filled
+from histories import START, VALVE, success
 from waiting import wait_until
 
 from valve_friction_ros.history import (
@@ -48,10 +48,7 @@ SECRET = "s3cret%2Fword"
 
 @pytest.fixture
 def history(tmp_path):
-    history = HistoryFile(tmp_path / "history.sqlite")
-    fill(history)
-    fill(history, OTHER)
-    return history
+    return filled(tmp_path)
 
 
 def test_it_is_read_as_the_file_is(history, database):

@@ -88,6 +88,14 @@ def fill(history, valve=VALVE):
     kept.keep_answers(history, valve, 0.02, [answer(1), answer(2, float("nan")), answer(0)])
 
 
+def filled(folder):
+    """The file of a plant of two valves."""
+    history = kept.HistoryFile(folder / "history.sqlite")
+    for valve in (VALVE, OTHER):
+        fill(history, valve)
+    return history
+
+
 def all_of(history):
     """Everything that is read of a history, as text: nan is not itself."""
     found = [history.valves(), history.entries()]

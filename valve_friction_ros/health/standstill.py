@@ -212,9 +212,14 @@ def held_finding(
 
     None without them, and where the stem may have rested on a stop.
     """
-    least, place = _surely_held(numbers, baseline, valve), numbers.get("held_position")
+    swing, middle, place = (
+        numbers.get(name) for name in ("held_friction", "held_force", "held_position")
+    )
+    if swing is None or place is None:
+        return None
+    least = _surely_held(swing, middle, place, baseline, valve)
     ratio = least / _healthy_friction(baseline)
-    if place is None or not ratio > limits.warn_ratio:
+    if not ratio > limits.warn_ratio:
         return None
     is_error = ratio > limits.error_ratio
     return Finding(
@@ -226,17 +231,14 @@ def held_finding(
     )
 
 
-def _surely_held(numbers: Mapping[str, Measured], baseline: Baseline, valve: Valve) -> float:
+def _surely_held(
+    swing: Measured, middle: Measured | None, place: Measured, baseline: Baseline, valve: Valve
+) -> float:
     """Return the largest static friction that surely held the stem in a test, N, or 0.
 
     It is half of the force's swing. At an end of its way, as in a partial stroke, the stem may have
     been pressed on a stop: what the force went beyond k·x + F_0 on that side says nothing then.
     """
-    swing, middle, place = (
-        numbers.get(name) for name in ("held_friction", "held_force", "held_position")
-    )
-    if swing is None or place is None:
-        return 0.0
     can_rise, can_fall = _room(place.value, baseline, valve)
     if can_rise and can_fall:
         return swing.value

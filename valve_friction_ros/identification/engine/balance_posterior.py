@@ -357,8 +357,8 @@ class Posterior:
         return math.sqrt(max(1.0 - variance * self.information, 0.0))
 
 
-def posterior_of(regression: Regression) -> "Posterior":
-    """Solve for the best Stribeck speed."""
+def posterior_of(regression: Regression) -> Posterior:
+    """Solve a regression for the best Stribeck speed; the variance is that of the residual."""
     found = {
         speed: regression.descended(speed)[0]
         for speed in (0.0, *(regression.averages.speed * _STRIBECK_SPEEDS).tolist())

@@ -233,9 +233,9 @@ class LagProfile:
     @cached_property
     def log_likelihood(self) -> _Array:
         """Logarithm of the likelihood of each of `LAGS`, by fits that are `_MISLED` at times."""
-        sharp, blunt = np.exp(self.by_fits), np.exp(self.by_fits / _TEMPERED)
-        misled = _MISLED / (1.0 - _MISLED) * np.sum(sharp) / np.sum(blunt)
-        return np.asarray(np.log(np.maximum(sharp + misled * blunt, np.finfo(float).tiny)))
+        blunt = self.by_fits / _TEMPERED
+        misled = _MISLED / (1.0 - _MISLED) * np.sum(np.exp(self.by_fits)) / np.sum(np.exp(blunt))
+        return np.asarray(np.logaddexp(self.by_fits, math.log(misled) + blunt))
 
     @property
     def spread(self) -> float:
