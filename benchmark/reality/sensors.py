@@ -28,7 +28,7 @@ class Stamping:
     Attributes
     ----------
     rate : float
-        Samples a second.
+        Samples per second.
     jitter : float
         Largest shift of an instant from its place, share of the period; the stamp is right.
     stamp_error : float
@@ -61,7 +61,7 @@ class Times(NamedTuple):
     period : float
         Nominal time between two samples, s.
     taken : ndarray of float, shape (n,)
-        When the samples were taken, s from the begin of the record.
+        When the samples were taken, s from the start of the record.
     written : ndarray of float, shape (n,)
         What the clock said then, s.
     lost : ndarray of bool, shape (n,)

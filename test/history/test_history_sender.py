@@ -335,28 +335,26 @@ def test_ten_writers(tmp_path, database):
 
 
 class TestAnotherMachine:
-    def test_a_valve_is_taken_where_it_was_kept_elsewhere(self, history, database, tmp_path):
-        fill(history)
-        fill(history, OTHER)
-        with sending(history, database) as sender:
+    def test_a_valve_is_taken_where_it_was_kept_elsewhere(self, full, database, tmp_path):
+        with sending(full, database) as sender:
             assert sender.take(VALVE) is None
             wait_until_sent(sender)
         second = HistoryFile(tmp_path / "second.sqlite")
         with sending(second, database) as sender:
             assert sender.take(VALVE) is None
             assert second.valves() == (VALVE,)
-            assert all_of(second)[2:10] == all_of(history)[2:10]
+            assert all_of(second)[2:10] == all_of(full)[2:10]
             assert count_unsent(second.path).waiting == 0
             second.set_baseline(VALVE, KeptBaseline(Baseline(99.0), START + 90, START + 90))
             keep_told_level(second, VALVE, Level.WARN)
             wait_until_sent(sender)
-        with sending(history, database) as sender:  # and back
+        with sending(full, database) as sender:  # and back
             assert sender.take(VALVE) is None
-            assert history.baseline(VALVE.name).baseline.coulomb_friction == 99.0
-            assert read_told_level(history, VALVE.name) is Level.WARN
-            assert read_told_level(history, OTHER.name) is Level.ERROR
+            assert full.baseline(VALVE.name).baseline.coulomb_friction == 99.0
+            assert read_told_level(full, VALVE.name) is Level.WARN
+            assert read_told_level(full, OTHER.name) is Level.ERROR
             wait_until_sent(sender)
-        assert all_of(History(database)) == all_of(history)
+        assert all_of(History(database)) == all_of(full)
 
     def test_its_own_rows_are_not_taken_again(self, history, database):
         history.add(success())
