@@ -418,6 +418,15 @@ def test_no_position_is_inverted_whose_loop_dissipates():
     require_related_signals(strokes(slope=-2e6))
 
 
+@pytest.mark.parametrize("frequency", [1.0, 6.05, 8.3])
+def test_a_mass_that_swings_against_the_pressure_dissipates(frequency):
+    """Its inertia reverses the pressure; above 5 Hz averages over 0.1 s see a wrong loop."""
+    angle = 2.0 * math.pi * frequency * 1e-3 * np.arange(20_000)
+    swinging = record(0.01 + 0.01 * np.sin(angle), 1e4 - 4e4 * np.sin(angle - 0.2), period=1e-3)
+    assert _followed(swinging).dissipates
+    assert not _followed(turned_over(swinging)).dissipates
+
+
 @pytest.mark.parametrize(("share", "passes"), [(0.48, True), (0.52, False)])
 def test_where_less_than_half_is_explained_the_sign_is_chance(share, passes):
     turned = turned_over(strokes_explaining(share))

@@ -246,7 +246,10 @@ def _followed(recording: Recording) -> _Followed:
     share = 1 - float(left @ left) / total if total > 0 else 0.0
     away = columns[:, 0]
     along = float(away @ target) / max(float(away @ away), np.finfo(float).tiny)
-    work = float(np.sum((target - target.mean() - along * away) * moves[moving]))
+    # Of the samples, not of the blocks: those of a stem that swings fast lose its phase.
+    between = [0.5 * (one[1:] + one[:-1]) for one in (recording.position, recording.drive)]
+    off_line = between[1] - target.mean() - along * (between[0] - place.mean())
+    work = float(off_line @ np.diff(recording.position))
     return _Followed(float(fitted[0]), share, work > 0.0)
 
 
