@@ -15,6 +15,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from pathlib import Path
 
 from valve_friction_ros.records.columns import Columns
 from valve_friction_ros.records.header_words import Named, known_unit, named, number_and_unit
@@ -52,6 +53,8 @@ class TableSignal:
         SeenColumn of its times, or of days and times of the day.
     quality : int or None
         SeenColumn of its qualities.
+    path : Path
+        Its file.
     """
 
     quantity: str
@@ -60,6 +63,7 @@ class TableSignal:
     place: int
     time: tuple[int, ...]
     quality: int | None = None
+    path: Path = Path()
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,6 +97,10 @@ class Layout:
         What each column was taken for, by its header.
     questions : tuple of str
         What the table leaves open, each with the option that settles it.
+    unclear : mapping of str to str
+        Of a file that holds a part of a valve's signals: what may be one of them, and its unit.
+    beside : tuple of Layout
+        The layouts of the other files of the valve.
     """
 
     raw: RawTable
@@ -108,6 +116,8 @@ class Layout:
     texts: tuple[str, ...]
     kinds: Mapping[str, str]
     questions: tuple[str, ...] = ()
+    unclear: Mapping[str, str] = field(default_factory=dict)
+    beside: "tuple[Layout, ...]" = ()
 
     @property
     def is_own(self) -> bool:
@@ -115,6 +125,7 @@ class Layout:
         names = [signal.name for signals in self.valves.values() for signal in signals]
         return (
             set(names) <= set(OWN.values())
+            and not self.beside
             and self.form.time_column == OWN["time"]
             and self.form.delimiter in ("", ",")
             and not self.form.time_format
@@ -123,6 +134,20 @@ class Layout:
     @cached_property
     def words(self) -> str:
         """Return in one line how the table is read."""
+        files = (self, *self.beside)
+        parts = [f"{len(files)} files of a valve"] if self.beside else []
+        parts += dict.fromkeys(word for one in files for word in one._form_words())  # noqa: SLF001
+        for name, signals in list(self.valves.items())[:_MOST_LABELS]:
+            told = [f"{one.quantity} {quoted(one.name)}" + _in_unit(one.unit) for one in signals]
+            parts.append((f"{name}: " if name else "") + ", ".join(told))
+        if len(self.valves) > _MOST_LABELS:
+            parts.append(f"and {len(self.valves) - _MOST_LABELS} valves more")
+        used = {signal.path for signals in self.valves.values() for signal in signals}
+        if idle := [one.raw.path.name for one in files if self.valves and one.raw.path not in used]:
+            parts.append(f"not needed: {', '.join(idle)}")
+        return "read as: " + "; ".join(parts)
+
+    def _form_words(self) -> list[str]:
         form = self.form
         parts = [_NAMES.get(form.delimiter, repr(form.delimiter))] if self.raw.is_text else []
         if self.raw.is_text:
@@ -131,13 +156,7 @@ class Layout:
                 parts.append({"cp1252": "Windows-1252"}.get(self.raw.encoding, self.raw.encoding))
         if self.tag_place is not None:
             parts.append("one value per row")
-        parts += sorted({self._time_words(form_of) for form_of in self.times.values()})
-        for name, signals in list(self.valves.items())[:_MOST_LABELS]:
-            told = [f"{one.quantity} {quoted(one.name)}" + _in_unit(one.unit) for one in signals]
-            parts.append((f"{name}: " if name else "") + ", ".join(told))
-        if len(self.valves) > _MOST_LABELS:
-            parts.append(f"and {len(self.valves) - _MOST_LABELS} valves more")
-        return "read as: " + "; ".join(parts)
+        return parts + sorted({self._time_words(form_of) for form_of in self.times.values()})
 
     def _time_words(self, form: TimeForm) -> str:
         if form.unit:
