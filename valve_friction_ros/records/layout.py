@@ -17,6 +17,8 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
+import numpy as np
+
 from valve_friction_ros.records.columns import Columns
 from valve_friction_ros.records.header_words import Named, known_unit, named, number_and_unit
 from valve_friction_ros.records.table_rows import RawTable
@@ -160,6 +162,9 @@ class Layout:
 
     def _time_words(self, form: TimeForm) -> str:
         if form.unit:
+            if form.origin > 0:
+                begin = f"{np.datetime64(form.origin // 10**6, 'ms')}"
+                return f"time in {form.unit} since {begin} UTC"
             return f"time in {form.unit}" if not form.origin else "time as the days of a clock"
         if not form.formats:
             return "time of the day"
@@ -178,6 +183,8 @@ _MOST_HEADER_ROWS = 8
 _TYPES = ("#TYPES", "#ROWS", "#datatype", "#group", "#default")
 """Beginnings of rows above the headers, of Ignition and InfluxDB, that name none."""
 _MOST_NAMES = 20
+_FILE_TIME = 116_444_736_000_000_000
+"""1970 in the time of Windows, 100 ns since 1601."""
 
 
 @dataclass
@@ -206,6 +213,8 @@ class Look:
         self.rows = [
             (line, [cell.strip() for cell in row]) for line, row in raw.rows(self.delimiter)
         ]
+        self.origin = self._top = 0
+        self._paired = self._paired_headers()
         self.start = self._start()
         self.columns = self._columns()
 
@@ -269,7 +278,7 @@ class Look:
         least = 0.3 * max(counts.values(), default=0)
         places = [place for place, count in counts.items() if count >= least]
         begin = len(rows)
-        for index in range(len(rows) - 1, self.form.skip_rows - 1, -1):
+        for index in range(len(rows) - 1, max(self.form.skip_rows, self._top) - 1, -1):
             row = rows[index]
             comment = self.form.comment and row and row[0].startswith(self.form.comment)
             if not any(row) or comment or row[0].startswith(_TYPES):
@@ -281,7 +290,34 @@ class Look:
             begin = index
         return begin
 
+    def _paired_headers(self) -> list[list[str]]:
+        """Return the headers where each channel has two columns, as in TwinCAT Scope; else none.
+
+        Above the milliseconds of a channel are the words for what is above its values: ``Name``,
+        ``Unit``. The beginning of the export is given as 100 ns since 1601.
+        """
+        found: dict[str, list[str]] = {}
+        for place, (line, row) in enumerate(self.rows):
+            begin = re.fullmatch(r"Start.*;(\d{18})", ";".join(row[:2]))
+            if begin and not found:
+                self.origin = (int(begin[1]) - _FILE_TIME) * 100
+            cells = row[: len(row) // 2 * 2]
+            if len(cells) > 2 and len({*cells[::2]}) == 1 and re.match(r"[A-Za-z]", cells[0]):
+                found[cells[0]] = cells[1::2]
+                self.rows[place] = (line, [])
+                self._top = place + 1
+        if "Name" not in found:
+            self.origin = self._top = 0
+            return []
+        units = [unit.split(" (")[0] for unit in found.get("Unit", [""] * len(found["Name"]))]
+        return [
+            [one for name in found["Name"] for one in ("time", name)],
+            [one for unit in units for one in ("ms", known_unit(unit))],
+        ]
+
     def _header_rows(self) -> list[list[str]]:
+        if self._paired:
+            return self._paired
         above = [row for _, row in self.rows[self.form.skip_rows : self.start] if any(row)]
         given = [value for name, value in vars(self.form).items() if name.endswith("_column")]
         for index, row in enumerate(above):

@@ -158,7 +158,7 @@ class _Recognition(Look):
             if not given or given == unit:
                 return TimeForm(unit=unit, origin=origin, zone=zone if unit in _LOCAL else "")
         if given or column.said.unit:
-            return TimeForm(unit=given or column.said.unit)
+            return TimeForm(unit=given or column.said.unit, origin=self.origin)
         numbers = self._numbers(column)
         steps = [b - a for a, b in pairwise(numbers) if b != a]
         if not steps or abs(median(steps)) <= _COARSE or self.form.time_column:
@@ -499,7 +499,7 @@ def recognized(raw: RawTable, form: Columns, is_part: bool = False) -> Layout:
         "encoding": form.encoding or (raw.encoding if raw.encoding == "cp1252" else ""),
         "time_zone": form.time_zone or time.zone,
     }
-    if len(first) == 1:
+    if len(first) == 1 and len(look.times) == 1:
         found["time_column"] = look.columns[first[0]].name
         found["time_unit"] = time.unit if not time.origin else ""
     if len(valves) == 1:

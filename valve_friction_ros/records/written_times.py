@@ -218,10 +218,11 @@ class WrittenTimes:
 
         if self._form.unit:
             size = NANOSECONDS[self._form.unit]
+            later = max(self._form.origin, 0)  # in whole ns: a double of a date rounds to 256 ns
             with np.errstate(over="ignore"):
-                scaled = numbers * size + self._form.origin
-            known = np.isfinite(scaled) & (np.abs(scaled) < 9e18)
-            whole = np.rint(np.where(known, scaled, 0)).astype(np.int64)
+                scaled = numbers * size + (self._form.origin - later)
+            known = np.isfinite(scaled) & (np.abs(scaled) < 9e18 - later)
+            whole = np.rint(np.where(known, scaled, 0)).astype(np.int64) + later
             whole = np.where(known, whole, NO_TIME)
             return self._localized(pd.DatetimeIndex(whole)) if self._form.zone else whole
         if pd.api.types.is_datetime64_any_dtype(cells.dtype):
