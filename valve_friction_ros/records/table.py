@@ -97,9 +97,11 @@ class _Parts:
             del self.blocks[0]
 
     def joined(self, last: float) -> ReadSignal:
-        stamps = np.concatenate([np.empty(0, np.int64), *(one.stamps for one in self.blocks)])
-        values = np.concatenate([np.empty(0), *(one.values for one in self.blocks)])
-        rows = np.concatenate([np.empty(0, np.int64), *(one.rows for one in self.blocks)])
+        """Return all samples; the blocks are given up, so that memory holds a signal once."""
+        blocks, self.blocks = self.blocks, []
+        stamps = np.concatenate([np.empty(0, np.int64), *(one.stamps for one in blocks)])
+        values = np.concatenate([np.empty(0), *(one.values for one in blocks)])
+        rows = np.concatenate([np.empty(0, np.int64), *(one.rows for one in blocks)])
         found = ReadSignal(self.signal, stamps, values, rows, self.bad, self.example)
         if stamps.size and math.isfinite(last):
             return found.where(stamps >= stamps[-1] - last * 1e9)
