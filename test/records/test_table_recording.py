@@ -415,8 +415,8 @@ class TestEntries:
         lines[20:23] = ["0.019,open,1e5", "0.02,open,1e5", "0.021,open,1e5"]
         path = write(lines)
         assert refused(path).startswith(
-            "row 12, column 'position_m': 'closed' is no good value, and so are 4 of 40 of "
-            "'position_m', more than 5 %"
+            "row 12, column 'position_m': 'closed' is not a valid value, and 4 of 40 values of "
+            "'position_m' are bad, more than 5 %"
         )
         assert "(--maximum-bad-share 0.11)" in refused(path)
         assert read_csv(path, BENCH_VALVE, Columns(maximum_bad_share=0.11))

@@ -279,7 +279,7 @@ def run(options: argparse.Namespace) -> int:
     files: list[Path] = [*filter(None, (options.output, options.table, options.form))]
     for path in files:
         if path.exists() and not options.replace:
-            raise ValueError(f"{path}: it is there: give another name, or --replace")
+            raise ValueError(f"{path}: it exists: give another name, or --replace")
     require_outputs(*files, picture=options.figure)
     plan = _planned(options)
     signal = span(options.signal_range, PRESSURE) if options.signal_range else None

@@ -162,10 +162,9 @@ class Layout:
 
     def _time_words(self, form: TimeForm) -> str:
         if form.unit:
-            if form.origin > 0:
-                begin = f"{np.datetime64(form.origin // 10**6, 'ms')}"
-                return f"time in {form.unit} since {begin} UTC"
-            return f"time in {form.unit}" if not form.origin else "time as the days of a clock"
+            since = str(np.datetime64(form.origin // 10**9, "s")).removesuffix("T00:00:00")
+            zone = form.zone or "UTC"
+            return f"time in {form.unit}" + (f" since {since} {zone}" if form.origin else "")
         if not form.formats:
             return "time of the day"
         order = "day first, " if form.formats[0].startswith("%d") else ""

@@ -173,7 +173,7 @@ class _Recognition(Look):
         forms = date_forms(texts)
         if forms is None or not (forms.day_first or forms.month_first):
             self.questions.append(
-                f"the form of the dates, as {quoted(texts[0])} (--time-format "
+                f"the format of the dates, such as {quoted(texts[0])} (--time-format "
                 "'%d.%m.%Y %H:%M:%S.%f')"
             )
             return TimeForm(("%Y",))

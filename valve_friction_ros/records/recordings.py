@@ -274,7 +274,7 @@ def _is_bag(path: Path, options: ReadingOptions) -> bool:
     if options.columns.opposing_pressure_column:
         raise ValueError(
             f"{path}: the actuator is double-acting (opposing_pressure_column), and a bag has one "
-            "pressure a valve: record the difference of the two, or export both as CSV"
+            "pressure per valve: record the difference of the two, or export both as CSV"
         )
     return True
 

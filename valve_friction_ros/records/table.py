@@ -480,8 +480,8 @@ def require_good(read: ReadSignal, form: Columns) -> None:
     share, most = count / whole, 100 * form.maximum_bad_share
     row, column, text = read.example
     raise ValueError(
-        f"{read.signal.path}: row {row}, column {column!r}: {quoted(text)} is no good value, and "
-        f"so are {count} of {whole} of {read.signal.name!r}, more than {most:.3g} %: "
+        f"{read.signal.path}: row {row}, column {column!r}: {quoted(text)} is not a valid value, "
+        f"and {count} of {whole} values of {read.signal.name!r} are bad, more than {most:.3g} %: "
         "use a stretch of the record without them, or allow more (--maximum-bad-share "
         f"{math.ceil(share * 100 + 0.5) / 100:g})"
     )
