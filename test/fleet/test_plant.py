@@ -245,6 +245,27 @@ def test_files_of_single_signals_are_one_record_of_their_valve(tmp_path, capsys)
     assert "0 to do" in capsys.readouterr().err
 
 
+def test_equal_questions_about_files_of_single_signals_are_one_line(tmp_path, capsys):
+    (tmp_path / "valves.csv").write_text(TABLE)
+    exports = tmp_path / "exports"
+    exports.mkdir()
+    pressure, position = stroke(150.0, 1)
+    for tag in ("FV101", "FV102"):
+        for end, values in (("PT", pressure / 1e5), ("PV", 1e3 * position)):
+            text = single(QUARTERS[0], "Timestamp,Value", values)
+            (exports / f"{tag}.{end}.csv").write_text(text)
+    arguments = ["--plant", str(tmp_path / "valves.csv"), "--jobs", "1", "--pressure-unit", "bar"]
+    arguments += ["--output", str(tmp_path / "friction.csv")]
+    assert run(["identify-folder", str(exports), *arguments]) == 2
+    out, err = capsys.readouterr()
+    assert err.count("cannot tell which of") == 1
+    assert (
+        "FV101.PT.csv + FV101.PV.csv, FV-101: cannot tell which of 'FV101.PT.csv', 'FV101.PV.csv' "
+        "is the position (--position-column 'FV101.PV'), and its unit (--position-unit)"
+    ) in err
+    assert "2 refused: cannot tell which of" in out
+
+
 def test_the_class_of_the_packing_counts_in_the_history_and_on_its_page(tmp_path):
     """A dead band of 27 % is bad for PTFE, and to be watched for graphite."""
     (tmp_path / "valves.csv").write_text(TABLE)

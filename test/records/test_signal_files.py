@@ -152,7 +152,7 @@ class TestForms:
             PT101=semicolons("Zeit;Druck [bar]", GAUGE / 1e5, zone="Europe/Berlin"),
             ZT101=commas(("tag", "ZT-101 (mm)"), STEM * 1e3, LATER),
         )
-        assert "the zone of the times of PT101.csv" in refused(paths)
+        assert "the zone of the times of 'PT101.csv'" in refused(paths)
         assert "(--time-zone UTC)" in refused(paths)
 
     def test_files_of_other_times_are_refused(self, write):
@@ -177,12 +177,12 @@ class TestQuestions:
         low, high = min(GAUGE[:300]) / 1e5, max(GAUGE[:300]) / 1e5  # the rows that are looked at
         message = refused(paths)
         assert (
-            "cannot tell in FV101.DRUCK.csv the unit of the pressure 'FV101.DRUCK', values from "
+            "cannot tell in 'FV101.DRUCK.csv' the unit of the pressure 'FV101.DRUCK', values from "
             f"{low:g} to {high:g} (--pressure-unit, one of Pa hPa "
         ) in message
         assert message.endswith(
-            "; which of FV101.DRUCK.csv, FV101.PV.csv is the position (--position-column "
-            "FV101.PV), and its unit (--position-unit)"
+            "; which of 'FV101.DRUCK.csv', 'FV101.PV.csv' is the position (--position-column "
+            "'FV101.PV'), and its unit (--position-unit)"
         )
 
     def test_two_of_a_kind(self, write):
@@ -190,7 +190,7 @@ class TestQuestions:
             PT101=semicolons("Time;bar", GAUGE / 1e5), PT102=semicolons("Time;bar", GAUGE / 1e5)
         )
         message = refused(paths)
-        assert "which of PT101.csv, PT102.csv is the pressure (--pressure-column" in message
+        assert "which of 'PT101.csv', 'PT102.csv' is the pressure (--pressure-column" in message
         assert "is the position (--position-column" in message
 
 

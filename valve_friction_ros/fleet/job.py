@@ -384,7 +384,8 @@ def identify_job(job: Job) -> list[Mapping[str, Cell]]:
             recorded = read_recordings(path, job.options.valve, reading)
             return [_cells(job, replace(each, path=job.path)) for each in recorded]
     except (ValueError, RefusalError, OSError) as error:
-        return [error_cells(job.options.tag, str(error), job.path)]
+        files = ", ".join(map(str, (job.path, *job.beside)))
+        return [error_cells(job.options.tag, str(error).removeprefix(f"{files}: "), job.path)]
     except Exception as error:  # noqa: BLE001 - one bad recording must not end the others
         return [error_cells("", f"unexpected {type(error).__name__}: {error}", job.path)]
 

@@ -12,7 +12,6 @@
 import csv
 import itertools
 import math
-import shlex
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -390,7 +389,7 @@ def _joined(layouts: Sequence[Layout]) -> Layout:
     first, *beside = layouts
     forms = [vars(each.form) for each in layouts]
     form = replace(first.form, **{name: one for each in forms for name, one in each.items() if one})
-    names = [each.raw.path.name for each in layouts]
+    names = [quoted(each.raw.path.name) for each in layouts]
     questions = [
         f"in {name} {question}"
         for name, each in zip(names, layouts, strict=True)
@@ -411,7 +410,7 @@ def _joined(layouts: Sequence[Layout]) -> Layout:
             chosen += several
             continue
         among = {one.name: one.unit for one in several} or unclear
-        listed = " or ".join(map(shlex.quote, [*among][:_MOST_NAMES]))
+        listed = " or ".join(map(quoted, [*among][:_MOST_NAMES]))
         unit = "" if any(among.values()) else f", and its unit (--{quantity}-unit)"
         questions.append(
             f"which of {', '.join(names)} is the {quantity} (--{quantity}-column {listed}){unit}"
