@@ -581,6 +581,7 @@ def bad_beyond(truth: Truth, random: Random) -> Export:
     """A fifth of the values bad: refused, with the option that allows it."""
     pressure, position, coarse = _signals(truth, "bar", "%")
     bad = random.random(len(pressure)) < 0.2
+    bad[:1] = False  # the time is that since the first sample
     shown = ["#N/A" if one else text for one, text in zip(bad, pressure, strict=True)]
     rows = [("Time (s)", "Position (%)", "Pressure (bar)")]
     rows += _columns(_rounded(truth.time, 3), position, shown)
@@ -688,6 +689,57 @@ def finnish(truth: Truth, random: Random) -> Export:
     return _file("vienti.csv", rows, ";", answers={"position_column": "Asento [%]"}, **coarse)
 
 
+_FILE_TIME = 116_444_736_000_000_000
+"""1970 in 100 ns since 1601."""
+
+
+def _scope(truth: Truth, mark: str) -> Export:
+    """Two columns a channel, whose time is in ms since the beginning; the stem at half the rate."""
+    pressure, position, coarse = _signals(truth, "bar", "mm", ",")
+    since = (truth.stamps - truth.stamps[0]) / 1e6
+    begin = truth.stamps[0] // 100 + _FILE_TIME
+    channels = [("GVL.fStelldruck", "bar (Pressure)"), ("GVL.fHub", "mm (Length)")]
+
+    def above(word: str, *cells: str) -> list[str]:
+        return [one for cell in cells for one in (word, cell)]
+
+    rows: list[Texts] = [
+        ("Name", "Scope YT Project"),
+        ("File", r"D:\Scope\valve.csv"),
+        ("Starttime of export", str(begin), "Freitag, 6. März 2026", "08:00:00.000"),
+        ("Endtime of export", str(begin), "Freitag, 6. März 2026", "08:00:00.000"),
+        (),
+        (),
+        above("Name", *(name for name, _ in channels)),
+        above("SymbolComment", "", ""),
+        above("Data-Type", "REAL64", "REAL64"),
+        above("SampleTime[ms]", "10", "20"),
+        above("SymbolName", *(f"MAIN.{name}" for name, _ in channels)),
+        above("IndexOffset", "385000", "385008"),
+        above("Port", "851", "851"),
+        above("Offset", "0", "0"),
+        above("ScaleFactor", "1", "1"),
+        above("Unit", *(unit for _, unit in channels)),
+        above("Unit Offset", "0", "0"),
+        (),
+    ]
+    times = _rounded(since, 3, ",")
+    left, right = [*zip(times, pressure, strict=True)], [*zip(times, position, strict=True)][::2]
+    right += [("", "")] * (len(left) - len(right))
+    rows += [(*one, *other) for one, other in zip(left, right, strict=True)]
+    return _file("scope.csv", [*rows, ("EOF",)], mark, clock=1e-6, **coarse)
+
+
+def twin_cat(truth: Truth, random: Random) -> Export:
+    del random
+    return _scope(truth, "\t")
+
+
+def twin_cat_semicolons(truth: Truth, random: Random) -> Export:
+    del random
+    return _scope(truth, ";")
+
+
 PROGRAMS: tuple[Callable[[Truth, Random], Export], ...] = (
     libreoffice_german, libreoffice_umlaut, libreoffice_english, excel, pandas_index, pandas_rows,
     pandas_parquet, pi_sampled, pi_csv, pi_pairs, aspen_long, aspen_wide, honeywell,
@@ -696,5 +748,5 @@ PROGRAMS: tuple[Callable[[Truth, Random], Export], ...] = (
     exaquantum, current_loop, influx, psql, laboratory, excel_days, newest_first, fraction,
     day_or_month, without_units, several_valves, thousands, german_thousands, win_cc, bad_beyond,
     opc_quality, kelvin_lab, ignition_table, yokogawa, rockwell, merged_cells, second_sheet,
-    quoted_commas, sentinels, excel_minutes, finnish,
+    quoted_commas, sentinels, excel_minutes, finnish, twin_cat, twin_cat_semicolons,
 )  # fmt: skip

@@ -171,12 +171,12 @@ def test_a_folder_of_everything(folder, output, arguments, texts, noisy, bench_y
         ]
     )
     assert "skipped, no recordings: .hidden.csv, notes.txt" in err
-    assert "broken.csv: row 2, column 'position_m': 'abc' is no good value" in err
+    assert "broken.csv: row 2, column 'position_m': 'abc' is not a valid value" in err
     assert [line.split() for line in out.splitlines()[1:3]] == [
         ["identified", "4"],
         ["refused", "1"],
     ]
-    assert "1 refused: row …, column '…': '…' is no good value" in out
+    assert "1 refused: row …, column '…': '…' is not a valid value" in out
     assert "(for example broken.csv)" in out
 
     description = read_valve_file(bench_yaml)
@@ -261,7 +261,7 @@ def test_a_page_against_baselines(folder, texts, tmp_path, output, arguments, ca
         report = (page.parent / link).read_text(encoding="utf-8")
         assert "times its baseline" in report
         assert "<b>" not in report
-    assert "column &#39;position_m&#39;: &#39;&lt;i&gt;&#39; is no good value" in text
+    assert "column &#39;position_m&#39;: &#39;&lt;i&gt;&#39; is not a valid value" in text
 
     # A report that is gone is written again, and nothing else is done.
     (page.parent / links[0]).unlink()

@@ -183,15 +183,15 @@ def test_times(friction, expected, record, valve, tmp_path, form, options):
 @pytest.mark.parametrize(
     ("entry", "options", "cause"),
     [
-        ("2026-11-21T08:00:00", (), "'2026-11-21T08:00:00' is no good value"),
-        ("2026-11-31T08:00:00", (), "'2026-11-31T08:00:00' is no good value"),
+        ("2026-11-21T08:00:00", (), "'2026-11-21T08:00:00' is not a valid value"),
+        ("2026-11-31T08:00:00", (), "'2026-11-31T08:00:00' is not a valid value"),
         (
             "2026-03-29T02:30:00",
             ("--time-zone", "Europe/Berlin"),
-            "'2026-03-29T02:30:00' is no good value",
+            "'2026-03-29T02:30:00' is not a valid value",
         ),
         ("2026-11-21T08:00:00", ("--time-zone", "Europe/Berlln"), "did you mean 'Europe/Berlin'?"),
-        ("x", ("--time-format", "%Y-%m-%dT%H:%M:%S"), "'x' is no good value"),
+        ("x", ("--time-format", "%Y-%m-%dT%H:%M:%S"), "'x' is not a valid value"),
     ],
 )
 def test_impossible_times(refusal, valve, tmp_path, entry, options, cause):

@@ -201,3 +201,32 @@ class TestWithoutRos:
         text = form.read_text()
         assert "ABORT" in text
         assert f"{float(rows[0]['abort_above_mm']):.1f} mm" in text
+
+    def test_table_and_form_in_psi_and_inch(self, plan, tmp_path, capsys):
+        """1 psi is 6894.757 Pa, and 1 in 25.4 mm: the same steps, to 1 Pa and to 0.01 mm."""
+        written = {}
+        for name, units in (
+            ("si", ()),
+            ("us", ("--pressure-unit", "PSI", "--position-unit", "inch")),
+        ):
+            table, form = tmp_path / f"{name}.csv", tmp_path / f"{name}.txt"
+            options = ("--table", table, "--form", form, "--replace", *units)
+            assert plan(*KNOWN, *QUICK, *options)[0] == 0
+            with table.open() as stream:
+                written[name] = list(csv.DictReader(stream)), form.read_text()
+        (metric, _), (inches, text) = written["si"], written["us"]
+        assert "pressure_kpa" not in inches[0]
+        for one, other in zip(inches, metric, strict=True):
+            assert one["setpoint_ma"] == other["setpoint_ma"]
+            assert float(one["pressure_psi"]) * 6.894757 == pytest.approx(
+                float(other["pressure_kpa"]), abs=1.1e-3
+            )
+            for end in ("below", "above"):
+                limit = float(one[f"abort_{end}_in"]) * 25.4
+                assert limit == pytest.approx(float(other[f"abort_{end}_mm"]), abs=0.011)
+        assert f"{float(inches[0]['abort_above_in']):.3f} in" in text
+        assert "kPa" not in text
+        assert " mm" not in text
+        with pytest.raises(SystemExit):
+            plan(*KNOWN, *QUICK, "--pressure-unit", "percent")
+        assert "--pressure-unit" in capsys.readouterr().err

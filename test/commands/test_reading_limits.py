@@ -107,7 +107,7 @@ class TestTables:
             path.write_bytes(HEADER + b"0," + cell + b",1e5\n")
             assert len(refusal(path, *bench_options)) < 400
         path.write_bytes(HEADER + b"0," + b"y" * 100_000 + b",1e5\n")
-        assert f"'{'y' * 40}…' is no good value" in refusal(path, *bench_options)
+        assert f"'{'y' * 40}…' is not a valid value" in refusal(path, *bench_options)
 
     def test_hostile_headers(self, refusal, tmp_path, bench_options):
         path = tmp_path / "a.csv"

@@ -192,6 +192,80 @@ def test_a_first_survey_ranks_by_the_dead_band_and_says_what_to_do(tmp_path, cap
     assert shares == pytest.approx(exact, rel=0.03)
 
 
+def single(begin, header, values):
+    """A signal of 100 Hz by itself, as historians write the exports of single tags."""
+    rows = [header]
+    for index, value in enumerate(values):
+        time = begin + timedelta(milliseconds=10 * index)
+        rows.append(f"{time:%Y-%m-%d %H:%M:%S}.{time.microsecond // 1000:03d},{value:.6f}")
+    return "\n".join(rows)
+
+
+def test_files_of_single_signals_are_one_record_of_their_valve(tmp_path, capsys):
+    """By their names, by the tags in the table, and by the quarter where there are several."""
+    (tmp_path / "valves.csv").write_text(
+        "tag;area [cm2];travel [mm];pressure_unit;position_unit;pressure_column;position_column\n"
+        "FV-101;445;28.575;bar;percent;;\n"
+        "FV-102;445;28.575;bar;percent;PT-2045;ZT-17\n"
+    )
+    exports = tmp_path / "exports"
+    exports.mkdir()
+
+    def write(name, begin, values):
+        (exports / f"{name}.csv").write_text(single(begin, "Timestamp,Value", values))
+
+    for quarter, begin, friction in (("Q1", QUARTERS[0], 150.0), ("Q2", QUARTERS[1], 300.0)):
+        pressure, position = stroke(friction, 1)
+        share = 100 * position / BENCH_VALVE.travel
+        write(f"FV101.PT_{quarter}", begin, pressure / 1e5)
+        write(f"FV101.ZT_{quarter}", begin, share)
+        write(f"FV101.SP_{quarter}", begin, share)
+    pressure, position = stroke(200.0, 2)
+    write("PT2045", QUARTERS[2], pressure / 1e5)
+    write("ZT17", QUARTERS[2], 100 * position / BENCH_VALVE.travel)
+    write("FV-102.PV", QUARTERS[2], position)
+    arguments = ["--plant", str(tmp_path / "valves.csv"), "--jobs", "1", "--fix", "mass=1.6"]
+    arguments += ["--output", str(tmp_path / "friction.csv")]
+    assert run(["identify-folder", str(exports), *arguments]) == 0
+    capsys.readouterr()
+    with (tmp_path / "friction.csv").open() as stream:
+        rows = {row["recording"]: row for row in csv.DictReader(stream)}
+    found = {name: (row["valve"], row["began"]) for name, row in rows.items()}
+    times = [f"{one:%Y-%m-%dT%H:%M:%SZ}" for one in QUARTERS]
+    assert found == {
+        "FV101.PT_Q1.csv + FV101.SP_Q1.csv + FV101.ZT_Q1.csv": ("FV-101", times[0]),
+        "FV101.PT_Q2.csv + FV101.SP_Q2.csv + FV101.ZT_Q2.csv": ("FV-101", times[1]),
+        "FV-102.PV.csv + PT2045.csv + ZT17.csv": ("FV-102", times[2]),
+    }
+    true = dict(zip(sorted(times[:3]), (150.0, 300.0, 200.0), strict=True))
+    for row in rows.values():
+        coulomb, width = (float(row[f"coulomb_friction{end}_n"]) for end in ("", "_half_width"))
+        assert abs(coulomb - true[row["began"]]) <= width
+    assert run(["identify-folder", str(exports), *arguments]) == 0
+    assert "0 to do" in capsys.readouterr().err
+
+
+def test_equal_questions_about_files_of_single_signals_are_one_line(tmp_path, capsys):
+    (tmp_path / "valves.csv").write_text(TABLE)
+    exports = tmp_path / "exports"
+    exports.mkdir()
+    pressure, position = stroke(150.0, 1)
+    for tag in ("FV101", "FV102"):
+        for end, values in (("PT", pressure / 1e5), ("PV", 1e3 * position)):
+            text = single(QUARTERS[0], "Timestamp,Value", values)
+            (exports / f"{tag}.{end}.csv").write_text(text)
+    arguments = ["--plant", str(tmp_path / "valves.csv"), "--jobs", "1", "--pressure-unit", "bar"]
+    arguments += ["--output", str(tmp_path / "friction.csv")]
+    assert run(["identify-folder", str(exports), *arguments]) == 2
+    out, err = capsys.readouterr()
+    assert err.count("cannot tell which of") == 1
+    assert (
+        "FV101.PT.csv + FV101.PV.csv, FV-101: cannot tell which of 'FV101.PT.csv', 'FV101.PV.csv' "
+        "is the position (--position-column 'FV101.PV'), and its unit (--position-unit)"
+    ) in err
+    assert "2 refused: cannot tell which of" in out
+
+
 def test_the_class_of_the_packing_counts_in_the_history_and_on_its_page(tmp_path):
     """A dead band of 27 % is bad for PTFE, and to be watched for graphite."""
     (tmp_path / "valves.csv").write_text(TABLE)

@@ -17,9 +17,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as some
 
-from benchmark.exports.programs import PROGRAMS
+from benchmark.exports.programs import PROGRAMS, pi_pairs, twin_cat, twin_cat_semicolons
 from benchmark.exports.trial import read
 from benchmark.exports.truth import draw
+from valve_friction_ros.model import Valve
+from valve_friction_ros.records.recordings import read_table
+from valve_friction_ros.records.table import OpenTable
 from valve_friction_ros.records.units import (
     FORCE_UNITS,
     NANOSECONDS,
@@ -55,7 +58,7 @@ def test_none_is_read_wrongly(outcomes):
 def test_nearly_all_are_read(outcomes):
     assert not {name for name, one in outcomes.items() if one.kind == "refused"}
     counts = Counter(one.options for one in outcomes.values())
-    assert counts[0] >= 41
+    assert counts[0] >= 43
     assert counts[0] + counts[1] >= 0.9 * len(outcomes)
     assert set(counts) <= {0, 1, 2}
 
@@ -65,6 +68,20 @@ def test_what_is_ambiguous_is_asked_for(outcomes):
     message = outcomes["without_units"].message
     assert "--pressure-unit" in message
     assert "--position-unit" in message
+
+
+@pytest.mark.parametrize("program", [twin_cat, twin_cat_semicolons, pi_pairs])
+def test_what_is_saved_of_a_table_with_several_times_reads_it_alike(program, tmp_path):
+    """Each signal keeps its own time, although the saved section names columns."""
+    (truth,) = draw(1, 3)
+    export = program(truth, np.random.default_rng(3))
+    path, valve = tmp_path / export.name, Valve(truth.area, 0.0, truth.travel)
+    path.write_bytes(export.content)
+    (first,) = read_table(path, valve)
+    (again,) = read_table(path, valve, OpenTable(path).layout.form)
+    assert again.recording().start_time == first.recording().start_time
+    np.testing.assert_array_equal(again.recording().drive, first.recording().drive)
+    np.testing.assert_array_equal(again.recording().position, first.recording().position)
 
 
 INCH = Fraction("0.0254")

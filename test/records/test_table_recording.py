@@ -13,7 +13,7 @@ import gzip
 import math
 import re
 from dataclasses import replace
-from datetime import datetime, timezone
+from datetime import datetime, timedelta, timezone
 
 import numpy as np
 import pytest
@@ -415,8 +415,8 @@ class TestEntries:
         lines[20:23] = ["0.019,open,1e5", "0.02,open,1e5", "0.021,open,1e5"]
         path = write(lines)
         assert refused(path).startswith(
-            "row 12, column 'position_m': 'closed' is no good value, and so are 4 of 40 of "
-            "'position_m', more than 5 %"
+            "row 12, column 'position_m': 'closed' is not a valid value, and 4 of 40 values of "
+            "'position_m' are bad, more than 5 %"
         )
         assert "(--maximum-bad-share 0.11)" in refused(path)
         assert read_csv(path, BENCH_VALVE, Columns(maximum_bad_share=0.11))
@@ -488,6 +488,23 @@ class TestTimes:
             write(["t,position_m,pressure_pa", *rows(stamps, POSITION, PRESSURE)]), BENCH_VALVE
         )
         assert record.start_time == 1.7e9
+
+    @pytest.mark.parametrize("form", ["%d.%m.%Y", "%m/%d/%Y", "%d-%m-%Y", "%Y-%m-%d"])
+    @pytest.mark.parametrize("mark", [".", ","])
+    def test_dates_in_any_order_with_and_without_zeros_and_fractions(self, write, form, mark):
+        """The 13th of March, from 9:59:58.5 on, every half second."""
+        begin = datetime(2026, 3, 13, 9, 59, 58, 500_000, timezone.utc)
+        lines = ["Time;Position [m];Pressure [Pa]"]
+        for index in range(40):
+            moment = begin + timedelta(seconds=0.5 * index)
+            date = moment.strftime(form)
+            date = date.replace("03", "3") if index % 3 == 0 and form != "%Y-%m-%d" else date
+            fraction = f"{mark}5" if moment.microsecond else f"{mark}000" if index % 4 else ""
+            lines.append(f"{date} {moment:%H:%M:%S}{fraction};{index / 1000};{1e5 + index}")
+        record = read_csv(write(lines), BENCH_VALVE)
+        assert record.start_time == begin.timestamp()
+        assert record.sample_period == 0.5
+        np.testing.assert_array_equal(record.position, np.arange(40) / 1000)
 
     def test_one_sample(self, write):
         assert refused(write([HEADER, GOOD[0]])) == (

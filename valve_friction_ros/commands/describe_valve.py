@@ -80,7 +80,7 @@ def run(options: argparse.Namespace) -> int:
     """Ask, and write the file."""
     output: Path | None = options.output
     if output is not None and output.exists() and not options.replace:
-        raise ValueError(f"{output}: it is there: give another name, or --replace")
+        raise ValueError(f"{output}: it exists: give another name, or --replace")
     answers = _answers(options)
     if answers["opposing_area"] is not None and answers["acting"] != "double":
         raise ValueError("--opposing-area is of a double-acting actuator: give --acting double")

@@ -169,7 +169,8 @@ def _of_healthy(
 
     Raises RefusalError, which names its file, where it cannot be a baseline.
     """
-    recorded = read_one(options.baseline_recording, valve, replace(reading, stretch=Stretch()))
+    whole = replace(reading, stretch=Stretch(), beside=())
+    recorded = read_one(options.baseline_recording, valve, whole)
     outcome = _identified(recorded, valve, identify, settings)
     if isinstance(outcome, RefusalError):
         raise outcome

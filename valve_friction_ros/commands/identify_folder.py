@@ -42,7 +42,7 @@ from valve_friction_ros.fleet.job import (
     identify_job,
     identify_job_elsewhere,
 )
-from valve_friction_ros.fleet.plant import read_plant, valves_of
+from valve_friction_ros.fleet.plant import read_plant, valves_of, with_parts_joined
 from valve_friction_ros.fleet.processes import DeadWorker, in_processes, usable_cores
 from valve_friction_ros.fleet.recordings import (
     Baselines,
@@ -109,6 +109,7 @@ def _valve_file(found: FoundRecording, common: Path | None) -> Path | None:
 def make_plan(
     findings: Findings,
     options: argparse.Namespace,
+    plant: Mapping[str, ValveFile],
     baselines: Baselines,
     reports: Path | None,
 ) -> Iterator[Plan]:
@@ -116,7 +117,6 @@ def make_plan(
 
     A table with several valves of the plant is as many recordings.
     """
-    plant = {} if options.plant is None else read_plant(options.plant)
     kept_baseline = cache(partial(baseline_kept, options.history))
 
     @cache
@@ -164,6 +164,7 @@ def make_plan(
                     reports,
                     options.history is not None,
                     kept_baseline(tag),
+                    found.beside,
                 )
                 yield Plan(name, content, wanted.fingerprint(), job)
         except (ValueError, OSError) as error:
@@ -373,9 +374,12 @@ def _planned(options: argparse.Namespace) -> dict[str, Plan]:
         raise ValueError(
             f"{options.folder}: there are no tables (CSV, xlsx, Parquet) and no bags in it"
         )
+    plant = {} if options.plant is None else read_plant(options.plant)
+    joined = tuple(with_parts_joined(findings.recordings, plant))
+    findings = replace(findings, recordings=joined)
     baselines = _baselines(options, [found.name for found in findings.recordings])
     wanted = any(map(is_page, options.output)) and not options.no_reports
-    plans = make_plan(findings, options, baselines, reports if wanted else None)
+    plans = make_plan(findings, options, plant, baselines, reports if wanted else None)
     return {plan.name: plan for plan in plans}
 
 

@@ -32,7 +32,7 @@ from valve_friction_ros.commands.process import ExitCode, complain
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.outside_text import printable
 from valve_friction_ros.records.layout import Layout
-from valve_friction_ros.records.table import OpenTable, ReadSignal
+from valve_friction_ros.records.table import OpenTables, ReadSignal
 from valve_friction_ros.streams import utc_second
 
 REFUSALS = (RefusalError,)
@@ -154,7 +154,7 @@ def run(options: argparse.Namespace) -> int:
     description = valve_of(options)
     reading = reading_options(options, description.columns if description else None)
     with reading_progress():
-        table = OpenTable(options.file, reading.columns)
+        table = OpenTables((options.file, *reading.beside), reading.columns)
         layout = table.layout
         named = [(label, one) for label, group in layout.valves.items() for one in group]
         reads: list[ReadSignal] = []
@@ -172,7 +172,7 @@ def run(options: argparse.Namespace) -> int:
     else:
         _print(layout, reads, signals)
     if layout.questions:
-        complain(options.command, f"{options.file}: cannot tell {'; '.join(layout.questions)}")
+        complain(options.command, f"{table.name}: cannot tell {'; '.join(layout.questions)}")
         return ExitCode.REFUSED
     save_columns(options, reading)
     if options.plot is not None:

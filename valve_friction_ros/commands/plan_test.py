@@ -36,9 +36,15 @@ from valve_friction_ros.planning import (
     set_points,
 )
 from valve_friction_ros.planning.search import Forecast
-from valve_friction_ros.planning.steps import form_of, table_of
+from valve_friction_ros.planning.steps import (
+    FINEST_POSITION,
+    FINEST_PRESSURE,
+    ShownUnit,
+    form_of,
+    table_of,
+)
 from valve_friction_ros.records.files import write_whole
-from valve_friction_ros.records.units import PRESSURE, span
+from valve_friction_ros.records.units import LENGTH, PRESSURE, span
 from valve_friction_ros.records.valve_file import read_valve_file
 from valve_friction_ros.wording import number_and_width
 
@@ -188,8 +194,8 @@ def print_plan(plan: StrokePlan, path: Path) -> None:
         "goes back to automatic."
     )
     console.print(
-        "Without ROS: --table writes the set points in %, mA and kPa for a control system, and "
-        "--form a sheet for a person, with the limits at which to abort."
+        "Without ROS: --table writes the set points in %, mA and pressure for a control system, "
+        "and --form a sheet for a person, with the limits at which to abort."
     )
     console.print(
         "On a valve, the topic is that of your converter's command, never that of the measured "
@@ -221,6 +227,16 @@ def _watched(plan: StrokePlan, path: Path) -> dict[str, Any]:
 
 def _parameters(values: dict[str, Any]) -> str:
     return " ".join(f"-p {name}:={shlex.quote(str(value))}" for name, value in values.items())
+
+
+def _units(options: argparse.Namespace) -> tuple[ShownUnit, ShownUnit]:
+    """Return the units of pressure and position in what is written for people."""
+    sizes = PRESSURE[options.pressure_unit], LENGTH[options.position_unit]
+    pressure, position = (size.multiplier / size.divisor for size in sizes)
+    return (
+        ShownUnit(options.pressure_unit, pressure, FINEST_PRESSURE),
+        ShownUnit(options.position_unit, position, FINEST_POSITION),
+    )
 
 
 REFUSALS = (RefusalError, HistoryError)
@@ -263,16 +279,17 @@ def run(options: argparse.Namespace) -> int:
     files: list[Path] = [*filter(None, (options.output, options.table, options.form))]
     for path in files:
         if path.exists() and not options.replace:
-            raise ValueError(f"{path}: it is there: give another name, or --replace")
+            raise ValueError(f"{path}: it exists: give another name, or --replace")
     require_outputs(*files, picture=options.figure)
     plan = _planned(options)
     signal = span(options.signal_range, PRESSURE) if options.signal_range else None
     texts = {}
     if options.table is not None or options.form is not None:
         steps = set_points(plan, signal)
+        units = _units(options)
         texts = {
-            options.table: table_of(steps, plan),
-            options.form: form_of(steps, plan, options.valve_name or ""),
+            options.table: table_of(steps, plan, *units),
+            options.form: form_of(steps, plan, options.valve_name or "", *units),
         }
     write_test(options.output, plan)
     for path, text in texts.items():

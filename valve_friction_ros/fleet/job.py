@@ -9,6 +9,7 @@
 
 """One recording to identify, and the rows of its results."""
 
+import contextlib
 import copy
 import hashlib
 import re
@@ -309,7 +310,7 @@ class Job:
 
     `name` is that of the recording in its folder; `reports` is where its reports will be written,
     if they are wanted; `is_filed` asks for what a history keeps of the result, and `baseline` is
-    that of the history.
+    that of the history; `beside` are further files with signals of its valve.
     """
 
     path: Path
@@ -318,6 +319,7 @@ class Job:
     reports: Path | None = None
     is_filed: bool = False
     baseline: Baseline | None = None
+    beside: tuple[Path, ...] = ()
 
 
 def _report(
@@ -376,11 +378,14 @@ def identify_job(job: Job) -> list[Mapping[str, Cell]]:
     its reason under ``error``. A page of a report goes with its row.
     """
     try:
-        with on_disk(job.path) as path:
-            recorded = read_recordings(path, job.options.valve, job.options.reading)
+        with contextlib.ExitStack() as fetched:
+            path, *beside = (fetched.enter_context(on_disk(one)) for one in (job.path, *job.beside))
+            reading = replace(job.options.reading, beside=tuple(beside))
+            recorded = read_recordings(path, job.options.valve, reading)
             return [_cells(job, replace(each, path=job.path)) for each in recorded]
     except (ValueError, RefusalError, OSError) as error:
-        return [error_cells(job.options.tag, str(error), job.path)]
+        files = ", ".join(map(str, (job.path, *job.beside)))
+        return [error_cells(job.options.tag, str(error).removeprefix(f"{files}: "), job.path)]
     except Exception as error:  # noqa: BLE001 - one bad recording must not end the others
         return [error_cells("", f"unexpected {type(error).__name__}: {error}", job.path)]
 

@@ -11,16 +11,19 @@
 
 import csv
 import re
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import fields
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
 import yaml
 
+from valve_friction_ros.fleet.recordings import FoundRecording
 from valve_friction_ros.outside_text import nearest, resembling
+from valve_friction_ros.records.bags.topics import is_bag
 from valve_friction_ros.records.columns import Columns
-from valve_friction_ros.records.files import cause_of
+from valve_friction_ros.records.files import cause_of, on_disk
+from valve_friction_ros.records.header_words import named
 from valve_friction_ros.records.table import OpenTable
 from valve_friction_ros.records.table_rows import encoding_of
 from valve_friction_ros.records.valve_description import QUESTIONS, valve_description
@@ -33,6 +36,8 @@ _WORDS = ("tag", "air_to", "sensor")
 _READ = {question.name: question.read for question in QUESTIONS}
 _HEADER = re.compile(r"\s*([\w ]+?)\s*(?:[\[(](.+)[\])])?\s*")
 _MOST_FAULTS = 6
+_MOST_SIGNALS = 3
+"""Files of single signals that are one record of a valve: pressure, position, set point."""
 
 
 _KNOWN = [*_WORDS, *_NUMBERS, *(each.name for each in fields(Columns))]
@@ -152,6 +157,66 @@ def tags_in(texts: Iterable[str], tags: Iterable[str]) -> list[str]:
     return found
 
 
+def _tags_named(texts: Iterable[str], plant: Mapping[str, ValveFile]) -> list[str]:
+    """Return the valves that texts name, by their tags or by those of their signals."""
+    texts = list(texts)
+    if found := tags_in(texts, plant):
+        return found
+    names: dict[str, list[str]] = {}
+    for tag, valve in plant.items():
+        form = valve.columns
+        for name in (form.pressure_column, form.position_column, form.force_column):
+            names.setdefault(name, []).append(tag)
+    own = {name: tags[0] for name, tags in names.items() if name and len(tags) == 1}
+    return [*dict.fromkeys(own[name] for name in tags_in(texts, own))]
+
+
+def _tag_of(name: str, plant: Mapping[str, ValveFile]) -> str:
+    """Return the valve that the path of a recording names; nothing if it names none or several."""
+    named = (_tags_named([text], plant) for text in reversed(Path(name).parts))
+    return next((found[0] for found in named if len(found) == 1), "")
+
+
+def _is_part(found: FoundRecording, valve: ValveFile) -> bool:
+    """Return whether a table holds a single signal, of which nobody can identify a valve."""
+    try:
+        with on_disk(found.path) as path:
+            if is_bag(path) or OpenTable(path, valve.columns).layout.valves:
+                return False
+            layout = OpenTable(path, valve.columns, is_part=True).layout
+    except (ValueError, OSError):
+        return False  # whoever reads it says why that fails
+    signals = {one.name for group in layout.valves.values() for one in group}
+    return len(signals | {*layout.unclear}) == 1
+
+
+def with_parts_joined(
+    recordings: Sequence[FoundRecording], plant: Mapping[str, ValveFile]
+) -> Iterator[FoundRecording]:
+    """Yield the recordings; files of single signals of a valve, in one folder, are one recording.
+
+    If a folder holds several records of a valve, those belong together whose names differ only in
+    the words for the signals, as ``FV101.PT 2026Q1.csv`` and ``FV101.ZT 2026Q1.csv``.
+    """
+    alike: dict[tuple[Path, str], list[FoundRecording]] = {}
+    for found in recordings:
+        if tag := _tag_of(found.name, plant):
+            alike.setdefault((found.path.parent, tag), []).append(found)
+    joined: dict[FoundRecording, FoundRecording | None] = {}
+    for (_, tag), files in alike.items():
+        parts = [one for one in files if len(files) > 1 and _is_part(one, plant[tag])]
+        groups: dict[str, list[FoundRecording]] = {}
+        for one in parts:
+            label = named([one.stem]).label if len(parts) > _MOST_SIGNALS else ""
+            groups.setdefault(label, []).append(one)
+        for first, *others in groups.values():
+            joined |= dict.fromkeys(others)
+            name = " + ".join([first.name, *(one.path.name for one in others)])
+            joined[first] = replace(first, name=name, beside=tuple(one.path for one in others))
+    whole = (joined.get(found, found) for found in recordings)
+    yield from (found for found in whole if found is not None)
+
+
 def valves_of(
     path: Path, name: str, plant: Mapping[str, ValveFile], is_table: bool
 ) -> Sequence[tuple[str, str, ValveFile]]:
@@ -162,16 +227,15 @@ def valves_of(
     Raises ValueError if none of the tags is named, or several are and the file does not tell which
     signal is whose.
     """
-    for text in reversed(Path(name).parts):
-        if len(found := tags_in([text], plant)) == 1:
-            return [("", found[0], plant[found[0]])]
+    if tag := _tag_of(name, plant):
+        return [("", tag, plant[tag])]
     if is_table:
         layout = OpenTable(path, Columns()).layout
         labels = [label for label in layout.valves if label]
-        by_label = [(label, tags_in([label], plant)) for label in labels]
+        by_label = [(label, _tags_named([label], plant)) for label in labels]
         if by_label and all(len(tags) == 1 for _, tags in by_label):
             return [(label, tag, plant[tag]) for label, (tag,) in by_label]
-        found = tags_in([*layout.headers, *layout.texts], plant)
+        found = _tags_named([*layout.headers, *layout.texts], plant)
         if len(found) == 1:
             return [("", found[0], plant[found[0]])]
         if found:

@@ -23,7 +23,14 @@ from valve_friction_ros.health.valve_numbers import COMPARED, IDENTIFIED_ONLY, f
 from valve_friction_ros.identification import Verdict
 from valve_friction_ros.identification.units import column_suffix
 from valve_friction_ros.outside_text import as_read
-from valve_friction_ros.records.files import cause_of, explained, state_of, walk
+from valve_friction_ros.records.files import (
+    cause_of,
+    explained,
+    state_of,
+    table_stem,
+    unpacked_name,
+    walk,
+)
 
 _METADATA = "metadata.yaml"
 _BAG_KEY = b"rosbag2_bagfile_information"
@@ -45,16 +52,18 @@ _HIDDEN = (".", "~$")
 class FoundRecording:
     """A recording, not yet read: a file or the folder of a bag.
 
-    Its name is its path from the searched folder, with slashes.
+    Its name is its path from the searched folder, with slashes. Where each signal of a valve has
+    its own file, `beside` are the further ones.
     """
 
     path: Path
     name: str
+    beside: tuple[Path, ...] = ()
 
     @property
     def stem(self) -> str:
         """Its name without folders and endings: ``NAME`` of ``NAME.valve.yaml``."""
-        return self.path.name if self.path.is_dir() else Path(_unpacked_name(self.path.name)).stem
+        return self.path.name if self.path.is_dir() else table_stem(self.path)
 
     def content(self) -> str:
         """Return a fingerprint of size and time of change of its file or files.
@@ -62,7 +71,7 @@ class FoundRecording:
         Raises OSError if they cannot be looked at.
         """
         folder = self.path.is_dir()
-        files = sorted(self.path.iterdir()) if folder else [self.path]
+        files = sorted(self.path.iterdir()) if folder else [self.path, *self.beside]
         digest = hashlib.blake2b(digest_size=8)
         for file in files:
             if not is_valve_file(file.name):
@@ -84,12 +93,8 @@ def is_valve_file(name: str) -> bool:
     return name == _VALVE_ENDING or name.endswith(f".{_VALVE_ENDING}")
 
 
-def _unpacked_name(name: str) -> str:
-    return re.sub(r"\.(gz|zstd)\Z", "", name, flags=re.IGNORECASE | re.ASCII)
-
-
 def _ending(name: str) -> str:
-    return Path(_unpacked_name(name)).suffix.lower()
+    return Path(unpacked_name(name)).suffix.lower()
 
 
 def _may_be_table(path: Path) -> bool:

@@ -14,6 +14,7 @@ import io
 import itertools
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.planning.search import StrokePlan
@@ -26,6 +27,38 @@ _LEVEL = 1e-6
 """Change of pressure, share of the band, below which a step is a hold."""
 _QUICK = 0.9
 """Share of the largest rate from which a stroke is called quick. Chosen."""
+
+
+class ShownUnit(NamedTuple):
+    """A unit of set points and limits.
+
+    Attributes
+    ----------
+    name : str
+        As ``psi``.
+    size : float
+        One of it in SI.
+    finest : float
+        What is shown of a value, in SI.
+    """
+
+    name: str
+    size: float
+    finest: float
+
+    def shown(self, value: float, fewer: int = 0) -> str:
+        """Return a value in SI in this unit, without its `fewer` last decimals."""
+        digits = math.ceil(math.log10(self.size / self.finest) - 1e-9) - fewer
+        return f"{value / self.size:.{max(digits, 0)}f}"
+
+    def column(self, name: str) -> str:
+        """Return the header of a column in this unit."""
+        return f"{name}_{self.name.lower().replace('/', '_')}"
+
+
+FINEST_PRESSURE, FINEST_POSITION = 1.0, 1e-5
+"""Pa and m to which a table shows set points and limits. Chosen: finer than any converter."""
+KPA, MM = ShownUnit("kPa", 1e3, FINEST_PRESSURE), ShownUnit("mm", 1e-3, FINEST_POSITION)
 
 
 def signal_range(valve: Valve, frictions: FrictionRange) -> tuple[float, float]:
@@ -145,21 +178,25 @@ def _share(pressure: float, low: float, high: float) -> float:
     return (pressure - low) / (high - low)
 
 
-def table_of(steps: tuple[SetPoint, ...], plan: StrokePlan) -> str:
-    """Write set points as a table (CSV): seconds, %, mA, kPa, bar, mm, limits, what each tells."""
-    travel = plan.valve.travel * 1e3
+def table_of(
+    steps: tuple[SetPoint, ...],
+    plan: StrokePlan,
+    pressure: ShownUnit = KPA,
+    position: ShownUnit = MM,
+) -> str:
+    """Write set points as a table (CSV): s, %, mA, pressure, limits of the stem, purpose."""
+    travel = plan.valve.travel
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(
-        ["time_s", "within_s", "setpoint_percent", "setpoint_ma", "pressure_kpa", "pressure_bar",
-         "abort_below_mm", "abort_above_mm", "tells"]
+        ["time_s", "within_s", "setpoint_percent", "setpoint_ma", pressure.column("pressure"),
+         position.column("abort_below"), position.column("abort_above"), "tells"]
     )  # fmt: skip
     for one in steps:
-        low, high = (share * travel for share in one.stem)
+        low, high = (position.shown(share * travel) for share in one.stem)
         writer.writerow(
             [f"{one.time:.2f}", f"{one.duration:.2f}", f"{100 * one.share:.2f}",
-             f"{one.milliamperes:.3f}", f"{one.pressure / 1e3:.3f}", f"{one.pressure / 1e5:.5f}",
-             f"{low:.2f}", f"{high:.2f}", one.tells]
+             f"{one.milliamperes:.3f}", pressure.shown(one.pressure), low, high, one.tells]
         )  # fmt: skip
     return text.getvalue()
 
@@ -169,31 +206,41 @@ def _clock(seconds: float) -> str:
     return f"{int(minutes)}:{rest:04.1f}"
 
 
-def form_of(steps: tuple[SetPoint, ...], plan: StrokePlan, tag: str) -> str:
+def form_of(
+    steps: tuple[SetPoint, ...],
+    plan: StrokePlan,
+    tag: str,
+    pressure: ShownUnit = KPA,
+    position: ShownUnit = MM,
+) -> str:
     """Write a form of a partial-stroke test for a person: before, limits, steps, after."""
-    travel, (low, high) = plan.valve.travel * 1e3, steps[0].stem
+    travel, (low, high) = plan.valve.travel, steps[0].stem
     band, likely = plan.band, plan.likely
+    of_stem, of_air = position.name, pressure.name
+    lowest, highest = (position.shown(share * travel, 1) for share in (low, high))
     lines = [
         f"PARTIAL-STROKE TEST   valve {tag or '________________'}   date ____________   "
         "by ________________",
         "",
         "BEFORE   [ ] operations agree   [ ] loop in manual   [ ] nobody near the stem",
         f"         [ ] signal brought slowly to {100 * steps[0].share:.1f} % "
-        f"({steps[0].milliamperes:.2f} mA, {steps[0].pressure / 1e3:.1f} kPa)   "
+        f"({steps[0].milliamperes:.2f} mA, {pressure.shown(steps[0].pressure, 2)} {of_air})   "
         "[ ] recording of pressure and stem runs",
         "",
         "ABORT    and go back slowly to the signal before the test, if",
-        f"         the stem is below {100 * low:.0f} % ({low * travel:.1f} mm) or above "
-        f"{100 * high:.0f} % ({high * travel:.1f} mm) of the travel,",
-        f"         the pressure is below {band.low / 1e3:.1f} or above {band.high / 1e3:.1f} kPa,",
+        f"         the stem is below {100 * low:.0f} % ({lowest} {of_stem}) or above "
+        f"{100 * high:.0f} % ({highest} {of_stem}) of the travel,",
+        f"         the pressure is below {pressure.shown(band.low, 2)} or above "
+        f"{pressure.shown(band.high, 2)} {of_air},",
         f"         the stem has not moved after {_clock(_first_return(steps))} (min:s),",
         "         or the process moves further than ________________",
         "",
-        f"{'at':>8} {'within':>8} {'to %':>7} {'mA':>7} {'kPa':>8}  done  stem mm  what it tells",
+        f"{'at':>8} {'within':>8} {'to %':>7} {'mA':>7} {of_air:>8}  done  stem {of_stem:<2}  "
+        "what it tells",
     ]
     lines += [
         f"{_clock(one.time):>8} {one.duration:>6.1f} s {100 * one.share:>7.1f} "
-        f"{one.milliamperes:>7.2f} {one.pressure / 1e3:>8.1f}  [ ]   _______  {one.tells}"
+        f"{one.milliamperes:>7.2f} {pressure.shown(one.pressure, 2):>8}  [ ]   _______  {one.tells}"
         for one in steps
     ]
     friction = likely.half_widths.get("coulomb_friction", math.nan)

@@ -65,7 +65,7 @@ class Columns:
         "", "zone of local times that name none, as Europe/Berlin; without it: UTC", "ZONE"
     )
     time_format: str = _described(
-        "", "form of the dates, as '%%d.%%m.%%Y %%H:%%M:%%S.%%f' (strptime)", "FORM"
+        "", "format of the dates, as '%%d.%%m.%%Y %%H:%%M:%%S.%%f' (strptime)", "FORM"
     )
     position_column: str = _described("", "header, or tag, of the stem position", "HEADER")
     position_unit: str = _described("", _units("position"), "UNIT")

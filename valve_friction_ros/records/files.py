@@ -15,6 +15,7 @@ stores are fsspec's own business: its variables of the environment, and its file
 
 import contextlib
 import os
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -59,6 +60,16 @@ def write_whole(path: Path, content: bytes) -> None:
         if not is_special:
             with contextlib.suppress(OSError):  # a read-only folder holds no draft
                 draft.unlink(missing_ok=True)
+
+
+def unpacked_name(name: str) -> str:
+    """Return the name of a file as it is when it is unpacked."""
+    return re.sub(r"\.(gz|zstd)\Z", "", name, flags=re.IGNORECASE | re.ASCII)
+
+
+def table_stem(path: Path) -> str:
+    """Return the name of a file without folders and endings, packed or not: its tag, perhaps."""
+    return Path(unpacked_name(path.name)).stem
 
 
 def cause_of(error: Exception) -> str:

@@ -15,6 +15,9 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from pathlib import Path
+
+import numpy as np
 
 from valve_friction_ros.records.columns import Columns
 from valve_friction_ros.records.header_words import Named, known_unit, named, number_and_unit
@@ -52,6 +55,8 @@ class TableSignal:
         SeenColumn of its times, or of days and times of the day.
     quality : int or None
         SeenColumn of its qualities.
+    path : Path
+        Its file.
     """
 
     quantity: str
@@ -60,6 +65,7 @@ class TableSignal:
     place: int
     time: tuple[int, ...]
     quality: int | None = None
+    path: Path = Path()
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,6 +99,10 @@ class Layout:
         What each column was taken for, by its header.
     questions : tuple of str
         What the table leaves open, each with the option that settles it.
+    unclear : mapping of str to str
+        Of a file that holds a part of a valve's signals: what may be one of them, and its unit.
+    beside : tuple of Layout
+        The layouts of the other files of the valve.
     """
 
     raw: RawTable
@@ -108,6 +118,8 @@ class Layout:
     texts: tuple[str, ...]
     kinds: Mapping[str, str]
     questions: tuple[str, ...] = ()
+    unclear: Mapping[str, str] = field(default_factory=dict)
+    beside: "tuple[Layout, ...]" = ()
 
     @property
     def is_own(self) -> bool:
@@ -115,6 +127,7 @@ class Layout:
         names = [signal.name for signals in self.valves.values() for signal in signals]
         return (
             set(names) <= set(OWN.values())
+            and not self.beside
             and self.form.time_column == OWN["time"]
             and self.form.delimiter in ("", ",")
             and not self.form.time_format
@@ -123,6 +136,20 @@ class Layout:
     @cached_property
     def words(self) -> str:
         """Return in one line how the table is read."""
+        files = (self, *self.beside)
+        parts = [f"{len(files)} files of a valve"] if self.beside else []
+        parts += dict.fromkeys(word for one in files for word in one._form_words())  # noqa: SLF001
+        for name, signals in list(self.valves.items())[:_MOST_LABELS]:
+            told = [f"{one.quantity} {quoted(one.name)}" + _in_unit(one.unit) for one in signals]
+            parts.append((f"{name}: " if name else "") + ", ".join(told))
+        if len(self.valves) > _MOST_LABELS:
+            parts.append(f"and {len(self.valves) - _MOST_LABELS} valves more")
+        used = {signal.path for signals in self.valves.values() for signal in signals}
+        if idle := [one.raw.path.name for one in files if self.valves and one.raw.path not in used]:
+            parts.append(f"not needed: {', '.join(idle)}")
+        return "read as: " + "; ".join(parts)
+
+    def _form_words(self) -> list[str]:
         form = self.form
         parts = [_NAMES.get(form.delimiter, repr(form.delimiter))] if self.raw.is_text else []
         if self.raw.is_text:
@@ -131,17 +158,13 @@ class Layout:
                 parts.append({"cp1252": "Windows-1252"}.get(self.raw.encoding, self.raw.encoding))
         if self.tag_place is not None:
             parts.append("one value per row")
-        parts += sorted({self._time_words(form_of) for form_of in self.times.values()})
-        for name, signals in list(self.valves.items())[:_MOST_LABELS]:
-            told = [f"{one.quantity} {quoted(one.name)}" + _in_unit(one.unit) for one in signals]
-            parts.append((f"{name}: " if name else "") + ", ".join(told))
-        if len(self.valves) > _MOST_LABELS:
-            parts.append(f"and {len(self.valves) - _MOST_LABELS} valves more")
-        return "read as: " + "; ".join(parts)
+        return parts + sorted({self._time_words(form_of) for form_of in self.times.values()})
 
     def _time_words(self, form: TimeForm) -> str:
         if form.unit:
-            return f"time in {form.unit}" if not form.origin else "time as the days of a clock"
+            since = str(np.datetime64(form.origin // 10**9, "s")).removesuffix("T00:00:00")
+            zone = form.zone or "UTC"
+            return f"time in {form.unit}" + (f" since {since} {zone}" if form.origin else "")
         if not form.formats:
             return "time of the day"
         order = "day first, " if form.formats[0].startswith("%d") else ""
@@ -159,6 +182,8 @@ _MOST_HEADER_ROWS = 8
 _TYPES = ("#TYPES", "#ROWS", "#datatype", "#group", "#default")
 """Beginnings of rows above the headers, of Ignition and InfluxDB, that name none."""
 _MOST_NAMES = 20
+_FILE_TIME = 116_444_736_000_000_000
+"""1970 in the time of Windows, 100 ns since 1601."""
 
 
 @dataclass
@@ -187,6 +212,8 @@ class Look:
         self.rows = [
             (line, [cell.strip() for cell in row]) for line, row in raw.rows(self.delimiter)
         ]
+        self.origin = self._top = 0
+        self._paired = self._paired_headers()
         self.start = self._start()
         self.columns = self._columns()
 
@@ -250,7 +277,7 @@ class Look:
         least = 0.3 * max(counts.values(), default=0)
         places = [place for place, count in counts.items() if count >= least]
         begin = len(rows)
-        for index in range(len(rows) - 1, self.form.skip_rows - 1, -1):
+        for index in range(len(rows) - 1, max(self.form.skip_rows, self._top) - 1, -1):
             row = rows[index]
             comment = self.form.comment and row and row[0].startswith(self.form.comment)
             if not any(row) or comment or row[0].startswith(_TYPES):
@@ -262,7 +289,34 @@ class Look:
             begin = index
         return begin
 
+    def _paired_headers(self) -> list[list[str]]:
+        """Return the headers where each channel has two columns, as in TwinCAT Scope; else none.
+
+        Above the milliseconds of a channel are the words for what is above its values: ``Name``,
+        ``Unit``. The beginning of the export is given as 100 ns since 1601.
+        """
+        found: dict[str, list[str]] = {}
+        for place, (line, row) in enumerate(self.rows):
+            begin = re.fullmatch(r"Start.*;(\d{18})", ";".join(row[:2]))
+            if begin and not found:
+                self.origin = (int(begin[1]) - _FILE_TIME) * 100
+            cells = row[: len(row) // 2 * 2]
+            if len(cells) > 2 and len({*cells[::2]}) == 1 and re.match(r"[A-Za-z]", cells[0]):
+                found[cells[0]] = cells[1::2]
+                self.rows[place] = (line, [])
+                self._top = place + 1
+        if "Name" not in found:
+            self.origin = self._top = 0
+            return []
+        units = [unit.split(" (")[0] for unit in found.get("Unit", [""] * len(found["Name"]))]
+        return [
+            [one for name in found["Name"] for one in ("time", name)],
+            [one for unit in units for one in ("ms", known_unit(unit))],
+        ]
+
     def _header_rows(self) -> list[list[str]]:
+        if self._paired:
+            return self._paired
         above = [row for _, row in self.rows[self.form.skip_rows : self.start] if any(row)]
         given = [value for name, value in vars(self.form).items() if name.endswith("_column")]
         for index, row in enumerate(above):

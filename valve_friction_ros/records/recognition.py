@@ -23,6 +23,7 @@ from statistics import median, mode
 from typing import Any
 
 from valve_friction_ros.records.columns import KNOWN_UNITS, Columns
+from valve_friction_ros.records.files import table_stem
 from valve_friction_ros.records.header_words import Named, named, number_and_unit
 from valve_friction_ros.records.layout import (
     OWN,
@@ -59,6 +60,9 @@ A column that is named without a unit is in its SI unit, as files of earlier ver
 _LOCAL = ("d", "microdays")
 """Units of clocks that count days: they are local, as those of spreadsheets are."""
 
+_UNCLEAR = ("", "value", "command")
+"""What the name of a column says that may be the pressure or the position all the same."""
+
 _Candidate = tuple[str, Named, int]
 """Name, what it says, and column of what may be a signal."""
 
@@ -66,8 +70,10 @@ _Candidate = tuple[str, Named, int]
 class _Recognition(Look):
     """Finds signals and times in a table that was looked at."""
 
-    def __init__(self, raw: RawTable, form: Columns) -> None:
+    def __init__(self, raw: RawTable, form: Columns, is_part: bool = False) -> None:
         super().__init__(raw, form)
+        self.is_part = is_part
+        self.unclear: dict[str, str] = {}
         self.times: dict[tuple[int, ...], TimeForm] = {}
         self.good: dict[int, Callable[[str], bool]] = {}
         self.tag_place: int | None = None
@@ -152,7 +158,7 @@ class _Recognition(Look):
             if not given or given == unit:
                 return TimeForm(unit=unit, origin=origin, zone=zone if unit in _LOCAL else "")
         if given or column.said.unit:
-            return TimeForm(unit=given or column.said.unit)
+            return TimeForm(unit=given or column.said.unit, origin=self.origin)
         numbers = self._numbers(column)
         steps = [b - a for a, b in pairwise(numbers) if b != a]
         if not steps or abs(median(steps)) <= _COARSE or self.form.time_column:
@@ -167,7 +173,7 @@ class _Recognition(Look):
         forms = date_forms(texts)
         if forms is None or not (forms.day_first or forms.month_first):
             self.questions.append(
-                f"the form of the dates, as {quoted(texts[0])} (--time-format "
+                f"the format of the dates, such as {quoted(texts[0])} (--time-format "
                 "'%d.%m.%Y %H:%M:%S.%f')"
             )
             return TimeForm(("%Y",))
@@ -268,7 +274,8 @@ class _Recognition(Look):
         unit = self._unit(quantity, name, said, place)
         before = [key for key in self.times if key[0] < place]
         time = max(before, key=lambda key: key[0], default=next(iter(self.times), (0,)))
-        return TableSignal(quantity, name, unit, place, time, self._quality(place, said, time))
+        quality = self._quality(place, said, time)
+        return TableSignal(quantity, name, unit, place, time, quality, self.raw.path)
 
     def _unit(self, quantity: str, name: str, said: Named, place: int) -> str:
         given = getattr(self.form, f"{quantity}_unit")
@@ -353,6 +360,8 @@ class _Recognition(Look):
         self.times = {group: self._time_form(group) for group in places}
         self._find_tags(taken)
         candidates = self._candidates(taken)
+        if self.is_part:
+            return {"": tuple(self._of_part(candidates))}
         chosen = {
             quantity: self._chosen(quantity, candidates)
             for quantity in ("position", "pressure", "force")
@@ -374,6 +383,22 @@ class _Recognition(Look):
             for label, (one, other) in pairs.items()
         }
 
+    def _of_part(self, candidates: Sequence[_Candidate]) -> Iterator[TableSignal]:
+        """Yield what a file holds of a valve; its name speaks for a column that says nothing."""
+        own = table_stem(self.raw.path)
+        of_name = named([own])
+        own = next((one for one in self.given if _plain(one) in _plain(own)), own)
+        by_name = []
+        for name, said, place in candidates:
+            if said.quantity in ("", "value") and name not in self.given:
+                said = of_name._replace(unit=said.unit or of_name.unit)  # noqa: PLW2901
+                name = name if self.tag_place is not None else own  # noqa: PLW2901
+            by_name.append((name, said, place))
+        for quantity in ("pressure", "force", "position"):
+            for each in self._chosen(quantity, by_name):
+                yield self._signal(quantity, *each)
+        self.unclear = {name: said.unit for name, said, _ in by_name if said.quantity in _UNCLEAR}
+
     def _opposing(self) -> Iterator[TableSignal]:
         name = self.form.opposing_pressure_column
         found = [each for each in self._candidates(set()) if each[0] == name]
@@ -386,13 +411,14 @@ class _Recognition(Look):
         name = getattr(self.form, f"{quantity}_column")
         if name:
             found = [each for each in candidates if each[0] == name]
-            if len(found) != 1 and (quantity != "force" or self.form.pressure_column == ""):
+            is_needed = quantity != "force" or self.form.pressure_column == ""
+            if len(found) != 1 and is_needed and not self.is_part:
                 if self.tag_place is None:
                     self.by_name(name, f"--{quantity}-column")
                 else:
                     self._ask_name(quantity, list(self.tags))
             return found if len(found) == 1 else []
-        other = self.form.opposing_pressure_column
+        other = "" if self.is_part else self.form.opposing_pressure_column
         found = [each for each in candidates if each[1].quantity == quantity and each[0] != other]
         own = [each for each in found if each[0] == OWN[quantity]]
         return own or found
@@ -427,12 +453,14 @@ class _Recognition(Look):
                 if len(found) == 1:
                     self._unit(quantity, *found[0])
                 continue
-            among = found or [
-                each for each in candidates if each[1].quantity in ("", "value", "command")
-            ]
+            among = found or [each for each in candidates if each[1].quantity in _UNCLEAR]
             self._ask_name(quantity, [name for name, _, _ in among])
             if among and not any(said_.unit for _, said_, _ in among):
                 self.questions[-1] += f", and its unit (--{quantity}-unit)"
+
+
+def _plain(name: str) -> str:
+    return "".join(filter(str.isalnum, name.casefold()))
 
 
 def _may_be_si(quantity: str, numbers: Sequence[float]) -> bool:
@@ -455,29 +483,32 @@ def _clearest(candidates: Sequence[_Candidate]) -> Sequence[_Candidate]:
     return candidates if len(candidates) == 1 else [one for one in candidates if one[1].is_strong]
 
 
-def recognized(raw: RawTable, form: Columns) -> Layout:
-    """Find out how a table is to be read, by what is said of it, and what it leaves open."""
-    look = _Recognition(raw, form)
+def recognized(raw: RawTable, form: Columns, is_part: bool = False) -> Layout:
+    """Find out how a table is to be read, by what is said of it, and what it leaves open.
+
+    Of a part of a valve's signals, which other files complete, whatever is there is taken.
+    """
+    look = _Recognition(raw, form, is_part)
     valves = look.signals()
     first = next(iter(look.times), ())
     time = look.times.get(first, TimeForm())
-    drive, position, *_ = next(iter(valves.values()), (None, None))
+    signals = next(iter(valves.values()), ())
     found: dict[str, Any] = {
         "delimiter": look.delimiter,
         "decimal": look.decimal if raw.is_text else "",
         "encoding": form.encoding or (raw.encoding if raw.encoding == "cp1252" else ""),
         "time_zone": form.time_zone or time.zone,
     }
-    if len(first) == 1:
+    if len(first) == 1 and len(look.times) == 1:
         found["time_column"] = look.columns[first[0]].name
         found["time_unit"] = time.unit if not time.origin else ""
-    if len(valves) == 1 and drive and position:
-        for signal in (drive, position):
+    if len(valves) == 1:
+        for signal in signals[:2]:
             found[f"{signal.quantity}_column"] = signal.name
             found[f"{signal.quantity}_unit"] = signal.unit
     if look.tag_place is not None:
         found["tag_column"] = look.columns[look.tag_place].name
-        found["value_column"] = look.columns[drive.place].name if drive else ""
+        found["value_column"] = look.columns[signals[0].place].name if signals else ""
     taken = {place for places in look.times for place in places}
     texts = [cell for _, row in look.rows[: look.start] for cell in row if cell]
     return Layout(
@@ -497,4 +528,5 @@ def recognized(raw: RawTable, form: Columns) -> Layout:
             for column in look.columns
         },
         tuple(dict.fromkeys(look.questions)),
+        look.unclear,
     )

@@ -23,7 +23,7 @@ from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.records.bags.topics import TopicChoice, bag_libraries, is_bag
 from valve_friction_ros.records.columns import Columns
 from valve_friction_ros.records.recorded_valve import RecordedValve, Stretch
-from valve_friction_ros.records.table import OpenTable, ReadSignal, left_out, require_good
+from valve_friction_ros.records.table import OpenTables, ReadSignal, left_out, require_good
 from valve_friction_ros.records.table_rows import readable
 from valve_friction_ros.records.units import (
     FORCE_UNITS,
@@ -41,13 +41,14 @@ def _share(read: ReadSignal) -> NDArray[np.float64]:
     return (read.values - low) / (high - low)
 
 
-def _position(path: Path, read: ReadSignal, form: Columns, valve: Valve) -> NDArray[np.float64]:
+def _position(read: ReadSignal, form: Columns, valve: Valve) -> NDArray[np.float64]:
     """Return the position in m, rising the way in which the pressure pushes the stem."""
     is_share = read.signal.unit in SHARES
     if (is_share or form.inverted_position) and not math.isfinite(valve.travel):
         needs = f"a position in {read.signal.unit}" if is_share else "an inverted position"
         raise ValueError(
-            f"{path}: {needs} is a share of the travel: name the travel in the valve file"
+            f"{read.signal.path}: {needs} is a share of the travel: name the travel in the valve "
+            "file"
         )
     if is_share and read.signal.unit != "percent":
         position = _share(read) * valve.travel
@@ -58,7 +59,7 @@ def _position(path: Path, read: ReadSignal, form: Columns, valve: Valve) -> NDAr
     return valve.travel - position if form.inverted_position else position
 
 
-def _pressure(path: Path, read: ReadSignal, valve: Valve, form: Columns) -> NDArray[np.float64]:
+def _pressure(read: ReadSignal, valve: Valve, form: Columns) -> NDArray[np.float64]:
     """Return a pressure in Pa; refuse one outside the sensor's range."""
     unit = read.signal.unit
     if unit in SHARES:
@@ -69,32 +70,30 @@ def _pressure(path: Path, read: ReadSignal, valve: Valve, form: Columns) -> NDAr
         )
         if not math.isfinite(high - low):
             raise ValueError(
-                f"{path}: a pressure in {unit} is a share of the transmitter's range: name it "
-                "(--pressure-range '0..2.5 bar', or pressure_minimum and pressure_maximum of the "
-                "valve file)"
+                f"{read.signal.path}: a pressure in {unit} is a share of the transmitter's range: "
+                "name it (--pressure-range '0..2.5 bar', or pressure_minimum and pressure_maximum "
+                "of the valve file)"
             )
         pressure = low + _share(read) * (high - low)
     else:
         pressure = PRESSURE_UNITS[unit].to_si(read.values)
-    _require_readable(path, read, valve, pressure)
+    _require_readable(read, valve, pressure)
     return pressure
 
 
-def _require_readable(
-    path: Path, read: ReadSignal, valve: Valve, pressure: NDArray[np.float64]
-) -> None:
+def _require_readable(read: ReadSignal, valve: Valve, pressure: NDArray[np.float64]) -> None:
     readable = valve.sensor_reads(pressure)
     if not readable.all():
-        sample = int(np.argmin(readable))
+        sample, unit = int(np.argmin(readable)), read.signal.unit
         raise ValueError(
-            f"{path}: {read.place(sample)}: {read.values[sample]:g} {read.signal.unit} is outside "
+            f"{read.signal.path}: {read.place(sample)}: {read.values[sample]:g} {unit} is outside "
             f"the sensor's range {valve.pressure_minimum:g} to {valve.pressure_maximum:g} Pa: use "
             "a stretch of the record without it, name its unit, or correct the range"
         )
 
 
 def _drive(
-    path: Path, reads: Sequence[ReadSignal], valve: Valve, form: Columns
+    reads: Sequence[ReadSignal], valve: Valve, form: Columns
 ) -> tuple[NDArray[np.float64], Drive]:
     """Return the drive in its SI unit.
 
@@ -105,22 +104,22 @@ def _drive(
     if read.signal.quantity == "force":
         force = FORCE_UNITS[read.signal.unit].to_si(read.values)
         drive = valve.actuator_drive(force)
-        _require_readable(path, read, valve, drive)
+        _require_readable(read, valve, drive)
         return drive, valve.driven_by
-    drive = _pressure(path, read, valve, form)
+    drive = _pressure(read, valve, form)
     for other in others:
-        opposing = _pressure(path, other, valve, form)
+        opposing = _pressure(other, valve, form)
         own = np.interp(read.stamps, other.stamps, opposing)
         drive = drive - form.opposing_area_ratio * (own - valve.pressure_reference)
     return drive, Drive.PRESSURE
 
 
-def holds_a_force(path: Path, form: Columns) -> bool:
-    """Return whether a force, and no pressure, drives the stem in a table.
+def holds_a_force(path: Path, form: Columns, beside: Sequence[Path] = ()) -> bool:
+    """Return whether a force, and no pressure, drives the stem in a table or several of a valve.
 
     Raises ValueError if the file cannot be read, or leaves something open.
     """
-    table = OpenTable(path, form)
+    table = OpenTables((path, *beside), form)
     table.require_settled()
     signals = (signal for group in table.layout.valves.values() for signal in group)
     return any(signal.quantity == "force" for signal in signals)
@@ -132,6 +131,7 @@ def read_table(
     form: Columns | None = None,
     stretch: Stretch | None = None,
     name: str | None = None,
+    beside: Sequence[Path] = (),
 ) -> tuple[RecordedValve, ...]:
     """Read the recordings of pressure, or force, and stem position of all valves of a table.
 
@@ -152,6 +152,8 @@ def read_table(
         The part to read; errors outside it do not matter.
     name : str, optional
         Only this valve of several.
+    beside : sequence of Path
+        Further files with signals of the same valve, where each signal has its own.
 
     Returns
     -------
@@ -166,7 +168,7 @@ def read_table(
     RefusalError
         If there is only one sample, or gaps take more than half of the time.
     """
-    table = OpenTable(path, form)
+    table = OpenTables((path, *beside), form)
     table.require_settled()
     valves = table.layout.valves
     if name is not None and len(valves) > 1:
@@ -196,16 +198,16 @@ def _plain(text: str) -> str:
 
 
 def _recorded(
-    table: OpenTable, label: str, reads: Sequence[ReadSignal], valve: Valve, form: Columns
+    table: OpenTables, label: str, reads: Sequence[ReadSignal], valve: Valve, form: Columns
 ) -> RecordedValve:
     """Make the recording of one valve: what drives it, its position, what opposes it."""
     path = table.path
     for each in reads:
-        require_good(path, each, form)
+        require_good(each, form)
     drives = [each for each in reads if each.signal.quantity != "position"]
     (stem,) = (each for each in reads if each.signal.quantity == "position")
-    drive, driven_by = _drive(path, drives, valve, form)
-    position = _position(path, stem, form, valve)
+    drive, driven_by = _drive(drives, valve, form)
+    position = _position(stem, form, valve)
     names = (drives[0].signal.name, stem.signal.name)
     by_name = dict(zip(names, (drives[0], stem), strict=True))
     try:
@@ -216,12 +218,12 @@ def _recorded(
             driven_by,
             lambda gap: (
                 f"row {by_name[gap.name].rows[gap.sample]}, column "
-                f"{table.layout.headers[by_name[gap.name].signal.time[0]]!r}: gap of "
+                f"{table.clock_of(by_name[gap.name].signal)!r}: gap of "
                 f"{gap.seconds:.3g} s: use a stretch of the record without it"
             ),
         )
     except RefusalError as refusal:
-        raise RefusalError(f"{path}: {refusal}") from None
+        raise RefusalError(f"{table.name}: {refusal}") from None
     notes = [] if table.layout.is_own else [table.layout.words]
     notes += [told for each in reads if (told := left_out(each))]
     return RecordedValve(path, label, recording, tuple(notes))
@@ -239,11 +241,14 @@ class ReadingOptions:
         The topics to read from a bag.
     stretch : Stretch
         The part of the time to read.
+    beside : tuple of Path
+        Further tables with signals of the same valve, where each signal has its own file.
     """
 
     columns: Columns = field(default_factory=Columns)
     topics: TopicChoice = field(default_factory=TopicChoice)
     stretch: Stretch = field(default_factory=Stretch)
+    beside: tuple[Path, ...] = ()
 
 
 def holds_force(path: Path, options: ReadingOptions) -> bool:
@@ -254,19 +259,22 @@ def holds_force(path: Path, options: ReadingOptions) -> bool:
     ValueError
         If it is a table that cannot be read, or has neither pressure nor force.
     """
-    return not _is_bag(path, options) and holds_a_force(path, options.columns)
+    is_table = not _is_bag(path, options)
+    return is_table and holds_a_force(path, options.columns, options.beside)
 
 
 def _is_bag(path: Path, options: ReadingOptions) -> bool:
     place = readable(path, options.columns.maximum_megabytes)
     if not is_bag(place):
         return False
+    if options.beside:
+        raise ValueError(f"{path}: a bag holds all signals of its valves: name it alone")
     if place != path:
         raise ValueError(f"{path}: a bag cannot come through a pipe: name its folder or file")
     if options.columns.opposing_pressure_column:
         raise ValueError(
             f"{path}: the actuator is double-acting (opposing_pressure_column), and a bag has one "
-            "pressure a valve: record the difference of the two, or export both as CSV"
+            "pressure per valve: record the difference of the two, or export both as CSV"
         )
     return True
 
@@ -303,4 +311,5 @@ def read_recordings(
         with bag_libraries():
             from valve_friction_ros.records.bags.reading import read_bag  # noqa: PLC0415
         return read_bag(path, valve, options.topics, options.stretch)
-    return read_table(path, valve, options.columns, options.stretch, options.topics.valve)
+    form, name = options.columns, options.topics.valve
+    return read_table(path, valve, form, options.stretch, name, options.beside)

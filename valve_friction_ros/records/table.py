@@ -38,6 +38,7 @@ if TYPE_CHECKING:
 _MOST_WORDS = 4
 """Kinds of bad entries that a message names. Chosen: it stays on one line."""
 _MOST_TAGS = 10_000
+_MOST_NAMES = 6
 _MOST_SPANS = 3.0
 """Spans of a share, as -100 to 200 %, beyond which a number stands for none, as -9999. Chosen."""
 _MOST_REPEATED = 0.5
@@ -95,9 +96,11 @@ class _Parts:
             del self.blocks[0]
 
     def joined(self, last: float) -> ReadSignal:
-        stamps = np.concatenate([np.empty(0, np.int64), *(one.stamps for one in self.blocks)])
-        values = np.concatenate([np.empty(0), *(one.values for one in self.blocks)])
-        rows = np.concatenate([np.empty(0, np.int64), *(one.rows for one in self.blocks)])
+        """Return all samples; the blocks are given up, so that memory holds a signal once."""
+        blocks, self.blocks = self.blocks, []
+        stamps = np.concatenate([np.empty(0, np.int64), *(one.stamps for one in blocks)])
+        values = np.concatenate([np.empty(0), *(one.values for one in blocks)])
+        rows = np.concatenate([np.empty(0, np.int64), *(one.rows for one in blocks)])
         found = ReadSignal(self.signal, stamps, values, rows, self.bad, self.example)
         if stamps.size and math.isfinite(last):
             return found.where(stamps >= stamps[-1] - last * 1e9)
@@ -115,10 +118,10 @@ class OpenTable:
         How it is read.
     """
 
-    def __init__(self, path: Path, form: Columns | None = None) -> None:
+    def __init__(self, path: Path, form: Columns | None = None, is_part: bool = False) -> None:
         self.path = path
         raw = open_raw(path, form or Columns())
-        self.layout: Layout = recognized(raw, form or Columns())
+        self.layout: Layout = recognized(raw, form or Columns(), is_part)
 
     def require_settled(self) -> None:
         """Raise ValueError if the table leaves something open: all of it, in one line."""
@@ -336,6 +339,112 @@ class OpenTable:
         return f"{self.path}: {place} {what} ({now} after {before}): {remedy}"
 
 
+class OpenTables:
+    """The table of a recording, or several of which each holds some signals of one valve.
+
+    Attributes
+    ----------
+    path : Path
+        The first file.
+    layout : Layout
+        How they are read; the signals are those of all.
+    """
+
+    def __init__(self, paths: Sequence[Path], form: Columns | None = None) -> None:
+        self.path = paths[0]
+        tables = [OpenTable(path, form, len(paths) > 1) for path in paths]
+        self._tables = dict(zip(paths, tables, strict=True))
+        layouts = [table.layout for table in tables]
+        self.layout = layouts[0] if len(layouts) == 1 else _joined(layouts)
+
+    @property
+    def name(self) -> str:
+        """All files, for a message."""
+        return ", ".join(map(str, self._tables))
+
+    def require_settled(self) -> None:
+        """Raise ValueError if the files leave something open: all of it, in one line."""
+        if len(self._tables) == 1:
+            self._tables[self.path].require_settled()
+        elif self.layout.questions:
+            raise ValueError(f"{self.name}: cannot tell {'; '.join(self.layout.questions)}")
+
+    def clock_of(self, signal: TableSignal) -> str:
+        """Return the header of the times of a signal."""
+        return self._tables[signal.path].layout.headers[signal.time[0]]
+
+    def read(
+        self, signals: Sequence[TableSignal], stretch: Stretch | None = None
+    ) -> list[ReadSignal]:
+        """Read signals, as `OpenTable.read` does; begin and end are those of each file."""
+        found: dict[TableSignal, ReadSignal] = {}
+        for path, table in self._tables.items():
+            if own := [signal for signal in signals if signal.path == path]:
+                found.update(zip(own, table.read(own, stretch), strict=True))
+        return [found[signal] for signal in signals]
+
+
+def _joined(layouts: Sequence[Layout]) -> Layout:
+    """Put the files of one valve together; ask which holds what, where they do not say it."""
+    first, *beside = layouts
+    forms = [vars(each.form) for each in layouts]
+    form = replace(first.form, **{name: one for each in forms for name, one in each.items() if one})
+    names = [quoted(each.raw.path.name) for each in layouts]
+    questions = [
+        f"in {name} {question}"
+        for name, each in zip(names, layouts, strict=True)
+        for question in each.questions
+    ]
+    signals = [one for each in layouts for group in each.valves.values() for one in group]
+    by_quantity = {
+        quantity: [one for one in signals if one.quantity == quantity]
+        for quantity in ("pressure", "force", "position")
+    }
+    drive = "pressure" if by_quantity["pressure"] or not by_quantity["force"] else "force"
+    opposing = [one for one in by_quantity["pressure"] if one.name == form.opposing_pressure_column]
+    unclear = {name: unit for each in layouts for name, unit in each.unclear.items()}
+    chosen = []
+    for quantity in (drive, "position"):
+        several = [one for one in by_quantity[quantity] if one not in opposing]
+        if len(several) == 1:
+            chosen += several
+            continue
+        among = {one.name: one.unit for one in several} or unclear
+        listed = " or ".join(map(quoted, [*among][:_MOST_NAMES]))
+        unit = "" if any(among.values()) else f", and its unit (--{quantity}-unit)"
+        questions.append(
+            f"which of {', '.join(names)} is the {quantity} (--{quantity}-column {listed}){unit}"
+        )
+    questions += _zones_apart(layouts, names)
+    return replace(
+        first,
+        form=form,
+        valves={"": (*chosen, *opposing)} if len(chosen) == 2 else {},
+        texts=tuple(text for each in layouts for text in each.texts),
+        kinds={name: kind for each in layouts for name, kind in each.kinds.items()},
+        questions=tuple(questions),
+        beside=tuple(beside),
+    )
+
+
+def _zones_apart(layouts: Sequence[Layout], names: Sequence[str]) -> Iterator[str]:
+    """Ask for the zone of the files without one, if others have theirs."""
+    dated = [
+        (name, form)
+        for name, each in zip(names, layouts, strict=True)
+        for form in [*each.times.values()][:1]
+        if form.formats
+    ]
+    stated = [(name, form) for name, form in dated if form.has_zone or form.zone]
+    others = [name for name, form in dated if not (form.has_zone or form.zone)]
+    if stated and others:
+        zone = stated[0][1].zone or "UTC"
+        yield (
+            f"the zone of the times of {', '.join(others)}; those of {stated[0][0]} have theirs "
+            f"(--time-zone {zone})"
+        )
+
+
 def _shown(stamp: int, form: TimeForm) -> str:
     return str(np.datetime64(int(stamp), "ns")) if form.formats else f"{stamp / 1e9:.12g} s"
 
@@ -361,7 +470,7 @@ def left_out(read: ReadSignal) -> str:
     )
 
 
-def require_good(path: Path, read: ReadSignal, form: Columns) -> None:
+def require_good(read: ReadSignal, form: Columns) -> None:
     """Refuse a signal with more bad values than are to be left out."""
     count = read.bad.total() - read.bad["repeated row"]
     whole = count + read.values.size
@@ -370,8 +479,8 @@ def require_good(path: Path, read: ReadSignal, form: Columns) -> None:
     share, most = count / whole, 100 * form.maximum_bad_share
     row, column, text = read.example
     raise ValueError(
-        f"{path}: row {row}, column {column!r}: {quoted(text)} is no good value, and so are "
-        f"{count} of {whole} of {read.signal.name!r}, more than {most:.3g} %: "
+        f"{read.signal.path}: row {row}, column {column!r}: {quoted(text)} is not a valid value, "
+        f"and {count} of {whole} values of {read.signal.name!r} are bad, more than {most:.3g} %: "
         "use a stretch of the record without them, or allow more (--maximum-bad-share "
         f"{math.ceil(share * 100 + 0.5) / 100:g})"
     )

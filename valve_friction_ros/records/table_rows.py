@@ -148,7 +148,7 @@ class _Bounded(io.RawIOBase):
         end = max(piece.rfind(b"\n"), piece.rfind(b"\r"))
         self._line = len(piece) - end - 1 + (self._line if end < 0 else 0)
         if self._line > _LONGEST_LINE:
-            raise ValueError(f"a line has more than {_LONGEST_LINE} bytes: it is no CSV file")
+            raise ValueError(f"a line has more than {_LONGEST_LINE} bytes: this is not a CSV file")
         self._require_quotes(piece)
         memoryview(room)[: len(piece)] = piece
         return len(piece)

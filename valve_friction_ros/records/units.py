@@ -165,7 +165,7 @@ def quantity(text: str, units: Mapping[str, Unit]) -> float:
     found = _SINGLE.fullmatch(text) if len(text) < 100 else None
     if found is None:
         example = next(each for known, each in _EXAMPLES if known is units)
-        raise ValueError(f"{text[:60]!r} is no number with its unit, as {example}")
+        raise ValueError(f"{text[:60]!r} is not a number with a unit, such as {example}")
     number, name = found.groups()
     return _si(number, _unit(text, name, units))
 
@@ -174,7 +174,7 @@ def span(text: str, units: Mapping[str, Unit]) -> tuple[float, float]:
     """Read a range with its unit, as ``0.2..1.0 bar``, in its SI unit; raises ValueError."""
     found = _SPAN.fullmatch(text) if len(text) < 100 else None
     if found is None:
-        raise ValueError(f"{text[:60]!r} is no range with its unit, as 0.2..1.0 bar")
+        raise ValueError(f"{text[:60]!r} is not a range with a unit, such as 0.2..1.0 bar")
     low, high, name = found.groups()
     unit = _unit(text, name, units)
     begin, end = _si(low, unit), _si(high, unit)

@@ -38,6 +38,7 @@ from valve_friction_ros.history import URL_VARIABLE
 from valve_friction_ros.identification import LEAST_FIT
 from valve_friction_ros.outside_text import nearest
 from valve_friction_ros.records.files import history_file
+from valve_friction_ros.records.units import LENGTH, PRESSURE, unit_named
 from valve_friction_ros.records.valve_description import QUESTIONS
 
 
@@ -185,9 +186,11 @@ def _plan_test(parser: argparse.ArgumentParser) -> None:
         parser,
         """
         --output FILE.csv: corners of the pressure signal: time_s and pressure_pa (%(default)s)
-        --table FILE.csv: set points with their times in %%, mA, kPa and bar, abort positions, and
+        --table FILE.csv: set points with their times in %%, mA and pressure, abort positions, and
             what each step determines: for a control system without ROS
         --form FILE.txt: the same as a partial-stroke test form, for a person with a stopwatch
+        --pressure-unit UNIT: of --table and --form: kPa, bar, psi … (%(default)s)
+        --position-unit UNIT: of --table and --form: mm, in … (%(default)s)
         --signal-range RANGE: pressures at 0 and 100 %% signal, such as '0.2..1.0 bar' (the spring
             range)
         --replace: overwrite an existing file
@@ -195,6 +198,8 @@ def _plan_test(parser: argparse.ArgumentParser) -> None:
         --json: print one JSON object
         """,
         output={"default": Path("stroke_test.csv")},
+        pressure_unit={"type": unit_named, "choices": [*PRESSURE], "default": "kPa"},
+        position_unit={"type": unit_named, "choices": [*LENGTH], "default": "mm"},
     )
 
 

@@ -42,6 +42,13 @@ def add_recording_arguments(parser: argparse.ArgumentParser) -> None:
         help="recording: CSV (gzipped or not, - for standard input), Excel or Parquet; or a ROS 2 "
         "bag, MCAP or SQLite3: its folder or one of its files, compressed or not",
     )
+    parser.add_argument(
+        "beside",
+        type=Path,
+        nargs="*",
+        metavar="FILE",
+        help="further tables of the same valve, where pressure and position have a file each",
+    )
     add_options(
         parser,
         """
@@ -122,6 +129,7 @@ def reading_options(
             arguments.pressure_topic, arguments.stem_topic, arguments.joint, arguments.valve_name
         ),
         Stretch(arguments.begin, arguments.end, arguments.last),
+        tuple(getattr(arguments, "beside", ())),
     )
 
 
@@ -141,10 +149,10 @@ def save_columns(arguments: argparse.Namespace, reading: "ReadingOptions") -> No
     if arguments.save_columns is None:
         return
     from valve_friction_ros.records.files import write_whole  # noqa: PLC0415
-    from valve_friction_ros.records.table import OpenTable  # noqa: PLC0415 - slow to import
+    from valve_friction_ros.records.table import OpenTables  # noqa: PLC0415 - slow to import
     from valve_friction_ros.records.valve_file import with_columns  # noqa: PLC0415
 
-    table = OpenTable(arguments.file, reading.columns)
+    table = OpenTables((arguments.file, *reading.beside), reading.columns)
     table.require_settled()
     source = arguments.valve
     text = "" if source is None else source.read_text(encoding="utf-8-sig")
