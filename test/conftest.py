@@ -9,6 +9,7 @@
 
 """Shared by all tests: the bench valves and their simulated records."""
 
+import contextlib
 import signal
 import subprocess
 import sys
@@ -67,6 +68,18 @@ def pytest_collection_modifyitems(items):
     for item in items:
         if "ros_environment" in item.fixturenames:
             item.add_marker(pytest.mark.flaky(reruns=1))
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item):
+    """Start the nodes that the tests of a module share anew for a test that runs a second time.
+
+    Those of its first run may be locked up, and do not end well then.
+    """
+    shared = item._fixtureinfo.name2fixturedefs.get("shared")
+    if shared and getattr(item, "execution_count", 1) > 1:
+        with contextlib.suppress(AssertionError):
+            shared[-1].finish(item._request)
 
 
 class Bench(NamedTuple):
