@@ -49,6 +49,13 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+class Pause(NamedTuple):
+    """A rest that was left out of a record: when, s, and its length, s."""
+
+    time: float
+    length: float
+
+
 class StemComparison(NamedTuple):
     """Measured position, as the identification took it, and the model's.
 
@@ -60,18 +67,22 @@ class StemComparison(NamedTuple):
         Positions, m.
     start : float
         Time of the first sample since the record began, s.
+    pauses : tuple of Pause
+        Rests that were left out, on a time without those before them.
     """
 
     sample_period: float
     measured: NDArray[np.float64]
     simulated: NDArray[np.float64]
     start: float = 0.0
+    pauses: tuple[Pause, ...] = ()
 
     @property
     def time(self) -> NDArray[np.float64]:
         """Time of each sample since the record began, s, shape (m,)."""
-        steps = np.arange(self.measured.size, dtype=np.float64)
-        return self.start + steps * self.sample_period
+        time = self.start + np.arange(self.measured.size, dtype=np.float64) * self.sample_period
+        before = np.searchsorted([one.time for one in self.pauses], time)
+        return np.asarray(time + np.cumsum([0.0, *(one.length for one in self.pauses)])[before])
 
     @property
     def residual(self) -> NDArray[np.float64]:

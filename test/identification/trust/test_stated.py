@@ -532,6 +532,22 @@ class TestTime:
         assert "lags behind the pressure" in message
         assert f"{unit} read as s?" in message
 
+    @pytest.mark.parametrize("seed", range(3))
+    def test_a_slow_loop_does_not_lag(self, seed):
+        """Noise in the speed of slow moves is no viscous friction."""
+        rng = np.random.default_rng(seed)
+        time = np.arange(0.0, 6 * 3600.0, 0.1)
+        angle = 2 * np.pi * time / rng.uniform(300, 3000)
+        pressure = 130e3 + rng.uniform(15e3, 55e3) * np.sin(angle)
+        stem = simulate(BENCH_VALVE, LOW_FRICTION, pressure, sample_period=0.1).position[::10]
+        noise = rng.standard_normal((2, stem.size))
+        record = Recording(
+            1.0,
+            pressure[::10] + rng.uniform(20, 300) * noise[0],
+            stem + rng.uniform(2e-6, 5e-5) * noise[1],
+        )
+        require_plausible_units(record, BENCH_VALVE, DEFAULTS)
+
     def test_seconds_that_were_read_as_milliseconds(self):
         assert "s read as ms" in refusal(self.bench(1e-3), BENCH_VALVE)
 

@@ -38,7 +38,7 @@ _MOST_STEPS = 12_500
 _MOST_FINE_STEPS = 5_000_000
 """Steps finer than the samples. Chosen: 28 h, some GB; a wrong unit of time asks for far more."""
 
-_MOST_SAMPLES = 16_000
+_MOST_SAMPLES = 64_000
 """Steps of a record whose pressure cannot be smoothed: there they are means of its samples."""
 
 _NOISELESS = 1e-6

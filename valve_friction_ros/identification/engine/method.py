@@ -37,6 +37,7 @@ from valve_friction_ros.identification.engine.intervals import (
     estimated,
 )
 from valve_friction_ros.identification.engine.lags import LagPrior, LagProfile
+from valve_friction_ros.identification.engine.moving_part import moving_part
 from valve_friction_ros.identification.engine.numbers import (
     ASYMMETRY,
     found_sizes,
@@ -47,6 +48,7 @@ from valve_friction_ros.identification.engine.remarks import sampling_remarks
 from valve_friction_ros.identification.engine.search import Prior, search
 from valve_friction_ros.identification.engine.sentences import (
     by_departures,
+    by_stretch,
     found_imperfections,
     main_doubt,
 )
@@ -106,14 +108,7 @@ from valve_friction_ros.signals import (
     MeasuredRecord,
     as_sent_on_change,
     measured,
-    stamped_noise,
 )
-
-_AROUND = 2.0
-_END = 20
-_MOVED_NOISE, _MOVED_SHARE = 8.0, 5e-3
-"""Time, s, kept before and after the motion; samples whose median is where the stem stands; and
-the distance at which it has left there, in deviations of its noise and as a share of its range."""
 
 _WINDOWS, _SHORTEST_WINDOW = 10, 3
 """Means of the position in which a record must show both directions, and the fewest samples in one:
@@ -200,7 +195,8 @@ def _identified(
         )
     uniform = measured(recording)
     require_moving_stem(uniform, valve, settings, recording.stamped is not None)
-    record = around_motion(stamped_record(recording))
+    part = moving_part(stamped_record(recording))
+    record = part.record
     lag = lag_prior_of(settings, profile)
     curves = friction_curves(record, valve, lag, known_of(settings))
     balanced, departed = curve_numbers(curves), None
@@ -252,12 +248,13 @@ def _identified(
         },
         findings=(
             *outcome.findings,
+            *((by_stretch(part.duration, part.motion),) if part.is_stretch else ()),
             *_left_to_published(settings),
             *(() if published is None else (sweep_finding(published),)),
         ),
         model=outcome.model,
         exhibit=published,
-        stem=outcome.stem,
+        stem=None if outcome.stem is None else outcome.stem._replace(pauses=part.pauses),
         sliding_speed=outcome.sliding_speed,
     )
 
@@ -455,29 +452,6 @@ def require_record(record: MeasuredRecord, valve: Valve, settings: Identificatio
     """Refuse a record in which the stem does not move both ways, or not with the drive."""
     require_moving_stem(record, valve, settings)
     require_related_signals(record)
-
-
-def around_motion(record: StampedRecord) -> StampedRecord:
-    """Return the part of a record in which the stem moves, and `_AROUND` before and after it.
-
-    A stem that stands, at a stop above all, says nothing of its friction.
-    """
-    stem = record.position
-    span = float(np.ptp(stem.value))
-    reach = max(_MOVED_NOISE * stamped_noise(stem), _MOVED_SHARE * span)
-    ends = [float(np.median(part)) for part in (stem.value[:_END], stem.value[-_END:])]
-    left = np.flatnonzero(np.abs(stem.value - ends[0]) > reach)
-    back = np.flatnonzero(np.abs(stem.value - ends[1]) > reach)
-    if not (left.size and back.size):
-        return record
-    begin, end = stem.time[left[0]] - _AROUND, stem.time[back[-1]] + _AROUND
-    signals = []
-    for signal in (record.drive, stem):
-        kept = (signal.time >= begin) & (signal.time <= end)
-        if np.count_nonzero(kept) < StampedSignal.FEWEST:
-            return record
-        signals.append(StampedSignal(signal.time[kept], signal.value[kept]))
-    return StampedRecord(signals[0], signals[1], record.driven_by)
 
 
 def stamped_record(recording: Recording) -> StampedRecord:

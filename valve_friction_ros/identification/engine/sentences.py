@@ -115,6 +115,14 @@ def late_sensor(name: str, value: float) -> str:
     )
 
 
+def by_stretch(used: float, motion: float) -> str:
+    """Return how much of the motion in a long record was used, both s."""
+    return (
+        f"of {motion / 60:.3g} min of motion, the {used / 60:.3g} min in which the stem travels "
+        "furthest were used"
+    )
+
+
 def by_departures(count: int) -> str:
     """Return from how many departures of the stem F_s comes."""
     return f"the static friction is the force at which the stem left its rests, {count} times"

@@ -26,7 +26,7 @@ from valve_friction_ros.identification.trust.uncertainty import block_covariance
 from valve_friction_ros.model.drive import Drive
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
-from valve_friction_ros.signals import Derivatives, MeasuredRecord, measured
+from valve_friction_ros.signals import measured, velocity_noise
 
 
 class _Quantity(NamedTuple):
@@ -66,10 +66,13 @@ _TRIP_SPEED = 5.0
 _TIME_CONSTANT = _Quantity("s", (0.0, 10.0), (1e-3, 2.0), {"ms": 1e-3, "µs": 1e-6, "ns": 1e-9})
 """F_v/k, in which a stem follows a step of pressure: 0.02 to 0.4 s for the paper's packings."""
 
-_ORDER = 3
-_MOVING_SHARE = 0.05
-"""Order of the derivatives, and speed over the top speed from which the stem counts as moving.
-Chosen: as in the other checks of a record."""
+_ORDER, _WINDOW = 3, 11
+"""Order of the derivatives, and their window where the unit of time itself is in doubt, samples."""
+
+_MOVING_SHARE, _MOVING_NOISE = 0.05, 4.0
+"""Speed from which the stem is moving: over the top speed, chosen as in the other checks of a
+record; and over the deviation of the noise in the speed, which in a record of slow moves would pass
+for viscous friction."""
 
 _MOST_BLOCKS = 200
 """Most blocks for a scatter. Chosen: noise makes any number of strokes, and memory is finite."""
@@ -173,24 +176,24 @@ def _is_valve(recording: Recording, valve: Valve) -> bool:
     return recording.driven_by is Drive.PRESSURE and valve.driven_by is Drive.PRESSURE
 
 
-def _velocity(recording: Recording) -> tuple[MeasuredRecord, Derivatives]:
-    record = measured(recording)
-    return record, record.derivatives(record.fitting_window(_ORDER), _ORDER)
-
-
 def _top_speed(recording: Recording) -> float:
-    return float(np.quantile(np.abs(_velocity(recording)[1].velocity), 0.999))
+    record = measured(recording)
+    velocity = record.derivatives(record.fitting_window(_ORDER), _ORDER).velocity
+    return float(np.quantile(np.abs(velocity), 0.999))
 
 
 def _least_time_constant(recording: Recording) -> float:
     """Low end of the interval of F_v/k, s, from pressure = k·x + F_v·ẋ ± F_c; 0 without one."""
-    record, derivatives = _velocity(recording)
+    record = measured(recording)
+    derivatives = record.derivatives(_WINDOW, _ORDER)
     velocity, place, pressure = (
         derivatives.velocity,
         derivatives.inner(record.position),
         derivatives.inner(record.drive),
     )
-    moving = np.abs(velocity) > _MOVING_SHARE * np.abs(velocity).max()
+    noise = velocity_noise(record.position_noise, record.sample_period, _WINDOW, _ORDER)
+    speed = np.abs(velocity)
+    moving = speed > max(_MOVING_SHARE * float(speed.max()), _MOVING_NOISE * noise)
     columns = np.column_stack(
         [velocity, place - place.mean(), np.sign(velocity), np.ones_like(velocity)]
     )
