@@ -115,7 +115,7 @@ def entries() -> dict[str, list[Entry]]:
 
 def pattern_of(key: str) -> re.Pattern[str]:
     """Return what the keys that an entry stands for look like."""
-    from valve_friction_ros.health.valve_changes import DIFFERENCES, RATIOS
+    from valve_friction_ros.health.measured import DIFFERENCES, RATIOS
     from valve_friction_ros.identification import PARAMETER_UNITS
 
     parts = {

@@ -43,7 +43,7 @@ from valve_friction_ros.health import (
     surveyed,
 )
 from valve_friction_ros.health.diagnosis import survey_of
-from valve_friction_ros.health.survey import PACKING_LIMITS
+from valve_friction_ros.health.levels import PACKING_LIMITS
 from valve_friction_ros.health.valve_numbers import SHARED
 from valve_friction_ros.identification import SPEED_EXPONENT, Parameter, Verdict, identify
 from valve_friction_ros.model import BENCH_VALVE, HIGH_FRICTION, LOW_FRICTION, Valve

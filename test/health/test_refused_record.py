@@ -31,12 +31,9 @@ from valve_friction_ros.health import (
     standstill_finding,
     valve_numbers,
 )
-from valve_friction_ros.health.measured import Measured
-from valve_friction_ros.health.refused_record import numbers_of_refused
-from valve_friction_ros.health.sensor_noise import sensor_noises
+from valve_friction_ros.health.measured import Measured, valve_changes
 from valve_friction_ros.health.standstill import held_finding, held_numbers
-from valve_friction_ros.health.stem_reach import stem_reach
-from valve_friction_ros.health.valve_changes import valve_changes
+from valve_friction_ros.health.valve_numbers import numbers_of_refused, sensor_noises, stem_reach
 from valve_friction_ros.identification import IdentificationSettings, RefusalError, identify
 from valve_friction_ros.model import (
     BENCH_VALVE,

@@ -13,19 +13,17 @@ from valve_friction_ros.health.alarm_conditions import (
     Delay as Delay,
     FrictionHold as FrictionHold,
 )
-from valve_friction_ros.health.alarm_digest import (
-    AlarmDigest as AlarmDigest,
-    DigestDesk as DigestDesk,
-)
 from valve_friction_ros.health.alarms import (
     Alarm as Alarm,
     AlarmAction as AlarmAction,
+    AlarmDigest as AlarmDigest,
     AlarmError as AlarmError,
     AlarmEvent as AlarmEvent,
     AlarmKind as AlarmKind,
     AlarmRequest as AlarmRequest,
     AlarmState as AlarmState,
     Condition as Condition,
+    DigestDesk as DigestDesk,
 )
 from valve_friction_ros.health.baseline import (
     Baseline as Baseline,
@@ -41,11 +39,6 @@ from valve_friction_ros.health.by_evidence import (
     lack_of_moves as lack_of_moves,
     reference_by_evidence as reference_by_evidence,
     why_not_compared as why_not_compared,
-)
-from valve_friction_ros.health.common_factor import (
-    drive_scale as drive_scale,
-    explains as explains,
-    qualified as qualified,
 )
 from valve_friction_ros.health.comparison import (
     Comparison as Comparison,
@@ -79,30 +72,34 @@ from valve_friction_ros.health.levels import (
     Finding as Finding,
     Level as Level,
     StatusSignal as StatusSignal,
+    Survey as Survey,
+    SurveyLimits as SurveyLimits,
     by_severity as by_severity,
+    surveyed as surveyed,
 )
-from valve_friction_ros.health.measured import DatedNumber as DatedNumber, Measured as Measured
-from valve_friction_ros.health.refused_record import RefusedRecordError as RefusedRecordError
+from valve_friction_ros.health.measured import (
+    DatedNumber as DatedNumber,
+    Measured as Measured,
+    valve_changes as valve_changes,
+)
 from valve_friction_ros.health.standstill import (
     Standstill as Standstill,
     StandstillCounter as StandstillCounter,
     standstill_finding as standstill_finding,
 )
-from valve_friction_ros.health.survey import (
-    Survey as Survey,
-    SurveyLimits as SurveyLimits,
-    surveyed as surveyed,
-)
-from valve_friction_ros.health.valve_changes import valve_changes as valve_changes
 from valve_friction_ros.health.valve_diagnosis import (
     ValveDiagnosis as ValveDiagnosis,
+    ValveLimits as ValveLimits,
     diagnose_numbers as diagnose_numbers,
     diagnose_parameters as diagnose_parameters,
     diagnose_valve as diagnose_valve,
+    drive_scale as drive_scale,
+    explains as explains,
+    qualified as qualified,
 )
-from valve_friction_ros.health.valve_limits import ValveLimits as ValveLimits
 from valve_friction_ros.health.valve_numbers import (
     OF_ONE_RESULT as OF_ONE_RESULT,
+    RefusedRecordError as RefusedRecordError,
     comparable_numbers as comparable_numbers,
     valve_numbers as valve_numbers,
 )

@@ -17,9 +17,15 @@ from typing import Any, Protocol
 
 from valve_friction_ros.health.baseline import Baseline
 from valve_friction_ros.health.comparison import Ratio, carried, compared
-from valve_friction_ros.health.levels import Finding, Level, StatusSignal
+from valve_friction_ros.health.levels import (
+    Finding,
+    Level,
+    StatusSignal,
+    Survey,
+    SurveyLimits,
+    surveyed,
+)
 from valve_friction_ros.health.measured import Measured
-from valve_friction_ros.health.survey import Survey, SurveyLimits, surveyed
 from valve_friction_ros.health.valve_numbers import comparable_numbers
 from valve_friction_ros.identification import SLIDING, Parameter, Result, plain
 from valve_friction_ros.model.valve import Valve

@@ -15,7 +15,6 @@ from typing import NamedTuple
 
 from valve_friction_ros.health.alarm_conditions import farthest
 from valve_friction_ros.health.baseline import Baseline, BaselineLack, Lack
-from valve_friction_ros.health.common_factor import qualified
 from valve_friction_ros.health.diagnosis import (
     Diagnosis,
     EarlierEstimate,
@@ -28,13 +27,14 @@ from valve_friction_ros.health.diagnosis import (
 )
 from valve_friction_ros.health.known_numbers import KnownNumbers
 from valve_friction_ros.health.levels import Finding, Level, StatusSignal
-from valve_friction_ros.health.measured import Measured
-from valve_friction_ros.health.refused_record import RefusedRecordError, numbers_of_refused
+from valve_friction_ros.health.measured import Measured, valve_changes
 from valve_friction_ros.health.standstill import held_finding, held_numbers
-from valve_friction_ros.health.valve_changes import valve_changes
-from valve_friction_ros.health.valve_diagnosis import diagnose_numbers
-from valve_friction_ros.health.valve_limits import ValveLimits
-from valve_friction_ros.health.valve_numbers import valve_numbers
+from valve_friction_ros.health.valve_diagnosis import ValveLimits, diagnose_numbers, qualified
+from valve_friction_ros.health.valve_numbers import (
+    RefusedRecordError,
+    numbers_of_refused,
+    valve_numbers,
+)
 from valve_friction_ros.identification import (
     DEFAULT_METHOD,
     IdentificationSettings,

@@ -13,12 +13,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from valve_friction_ros.health.baseline import Baseline
-from valve_friction_ros.health.common_factor import common_factor
 from valve_friction_ros.health.levels import Finding
-from valve_friction_ros.health.measured import DatedNumber, Measured
-from valve_friction_ros.health.valve_changes import valve_changes
-from valve_friction_ros.health.valve_diagnosis import diagnose_numbers
-from valve_friction_ros.health.valve_limits import ValveLimits
+from valve_friction_ros.health.measured import DatedNumber, Measured, valve_changes
+from valve_friction_ros.health.valve_diagnosis import ValveLimits, common_factor, diagnose_numbers
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.wording import Code, said
 

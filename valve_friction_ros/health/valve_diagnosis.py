@@ -7,29 +7,86 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""What has changed on a valve beside its friction, and what to check."""
+"""What has changed on a valve beside its friction, by how much it may, and what to check."""
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import NamedTuple
 
 from valve_friction_ros.health.baseline import Baseline
-from valve_friction_ros.health.common_factor import (
-    common_factor,
-    drive_scale,
-    qualified,
-    spring_change,
-)
 from valve_friction_ros.health.diagnosis import Diagnosis, FrictionLimits, diagnose
 from valve_friction_ros.health.levels import Finding, Level, StatusSignal
-from valve_friction_ros.health.measured import Measured
-from valve_friction_ros.health.valve_changes import difference, valve_changes
-from valve_friction_ros.health.valve_limits import ValveLimits
+from valve_friction_ros.health.measured import Measured, difference, valve_changes
 from valve_friction_ros.health.valve_numbers import valve_numbers
 from valve_friction_ros.identification import Result
+from valve_friction_ros.model.drive import Drive
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.wording import Code, Statement, said
+
+
+@dataclass(frozen=True)
+class ValveLimits:
+    """Bounds of the change of a valve, beside those of its friction (`FrictionLimits`).
+
+    A bound counts as passed only when the whole interval of the change lies beyond it.
+
+    Attributes
+    ----------
+    spring_change, spring_failure : float
+        Change of the spring constant, as a share, that is worth a look, and that is a failure.
+    preload_change : float
+        Shift of the balance, as a share of the spring's force over the travel.
+    slip_change : float
+        Growth of the slip jump (F_s − F_c)/k, as a share of the travel.
+    viscous_factor : float
+        Factor, up or down, of the viscous friction.
+    asymmetry_change : float
+        Change of the share by which viscous friction is larger upward.
+    stop_change : float
+        Shift of a travel stop, as a share of the travel.
+    noise_factor : float
+        Factor, upward, of the noise of a sensor.
+    lag_change : float
+        Change of the lag of the stem behind the pressure, s.
+
+    Raises
+    ------
+    ValueError
+        If a limit is not above zero, a factor is not above 1, or the spring's two are out of order.
+
+    Notes
+    -----
+    No standard gives such bounds; the defaults are chosen. Springs keep their constant within some
+    percent for decades, so 15 % is a fault of spring or scale, and 30 % is one spring of three.
+    3 % of the balance is above the drift of industrial sensors and below the usual margin of a
+    bench set. A slip jump of 1 % more of the travel is as large as the steps that a loop commonly
+    makes. A stop that has moved by 2 % no longer shuts, or opens, as it did. Viscous friction
+    trades with the lag and changes with the temperature, so only a factor of 2 counts.
+    """
+
+    spring_change: float = 0.15
+    spring_failure: float = 0.30
+    preload_change: float = 0.03
+    slip_change: float = 0.01
+    viscous_factor: float = 2.0
+    asymmetry_change: float = 0.2
+    stop_change: float = 0.02
+    noise_factor: float = 2.0
+    lag_change: float = 0.02
+
+    def __post_init__(self) -> None:
+        """Refuse impossible limits."""
+        for name in (one.name for one in fields(self)):
+            least = 1.0 if name.endswith("factor") else 0.0
+            if not (value := getattr(self, name)) > least:
+                raise ValueError(f"{name} must be above {least:g}, got {value:g}")
+        if not self.spring_change < self.spring_failure < 1:
+            raise ValueError(
+                "limits must obey spring_change < spring_failure < 1, got spring_change "
+                f"{self.spring_change:g}, spring_failure {self.spring_failure:g}"
+            )
+
 
 _SIDES = {
     "lower_stop": ("lowest_position", -1.0),
@@ -382,3 +439,57 @@ def _lag(case: _Case) -> Iterator[Finding]:
         return
     later, interval = change.value > 0, change.interval
     yield _check(said(Code.LAG_CHANGED, later=later, drive=case.drive, change=interval), "lag")
+
+
+_COMMON_SHARE = 0.3
+"""Share by which the upper end of a ratio may lie above the lower, to speak for a common factor."""
+
+
+def drive_scale(valve: Valve) -> Statement:
+    """Return what scales all forces of a valve alike."""
+    code = Code.AREA_AND_SCALE if valve.driven_by is Drive.PRESSURE else Code.SCALE
+    return said(code, drive=valve.driven_by.name)
+
+
+def spring_change(changes: Mapping[str, Measured], limits: ValveLimits) -> Measured | None:
+    """Return the ratio of the spring constants where it is surely beyond its bound."""
+    change, share = changes.get("spring_constant"), limits.spring_change
+    return change if change is not None and change.beyond(1 - share, 1 + share) else None
+
+
+def common_factor(changes: Mapping[str, Measured], limits: ValveLimits) -> Measured | None:
+    """Return the factor by which all forces have changed, as by another scale of the drive.
+
+    None where the spring constant has not surely changed, or the frictions not by its factor.
+    """
+    spring, coulomb = spring_change(changes, limits), changes.get("coulomb_friction")
+    if spring is None or coulomb is None or coulomb.holds(1.0) or not _is_narrow(coulomb):
+        return None
+    others = [changes.get(name) for name in ("static_friction", "viscous_friction")]
+    known = [one for one in others if one is not None and _is_narrow(one)]
+    return spring if all(one.agrees_with(spring) for one in (coulomb, *known)) else None
+
+
+def _is_narrow(ratio: Measured) -> bool:
+    """Return whether a ratio is known well enough to speak for a common factor."""
+    return ratio.low > 0 and ratio.high / ratio.low < 1 + _COMMON_SHARE
+
+
+def explains(factor: Measured | None, diagnosis: Diagnosis) -> bool:
+    """Return whether a common factor explains what a diagnosis finds on the friction."""
+    ratio = diagnosis.ratio
+    if factor is None or ratio is None or diagnosis.level < Level.WARN:
+        return False
+    return ratio.agrees_with(factor)
+
+
+def qualified(diagnosis: Diagnosis, factor: Measured | None, valve: Valve) -> Diagnosis:
+    """Return a diagnosis that says so where a common factor explains what it finds.
+
+    The level stays, as nothing proves that the friction is healthy; the signal is to check the
+    function.
+    """
+    if not explains(factor, diagnosis) or diagnosis.statement.code is Code.SCALED:
+        return diagnosis
+    statement = said(Code.SCALED, scale=drive_scale(valve), of=diagnosis.statement)
+    return replace(diagnosis, status_signal=StatusSignal.CHECK_FUNCTION, statement=statement)

@@ -9,22 +9,240 @@
 
 """What a result says of the whole valve: parameters, ends of the stem's motion, sensors."""
 
+import contextlib
 import math
 from collections.abc import Mapping
 from typing import Any
 
-from valve_friction_ros.health.measured import Measured
-from valve_friction_ros.health.sensor_noise import sensor_noises
-from valve_friction_ros.health.stem_reach import stem_reach
-from valve_friction_ros.health.valve_changes import DIFFERENCES
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from valve_friction_ros.health.measured import DIFFERENCES, Measured
 from valve_friction_ros.identification import (
     COMPARABLE,
     IMPERFECTIONS_FOUND,
     SPEED_EXPONENT,
+    IdentificationSettings,
     Parameter,
+    RefusalError,
     Result,
     Verdict,
 )
+from valve_friction_ros.identification.trust.excitation import (
+    require_drive,
+    require_motion,
+    require_related_signals,
+    require_travel,
+    require_two_directions,
+    require_within_travel,
+)
+from valve_friction_ros.identification.trust.plausible_units import require_plausible_units
+from valve_friction_ros.model.recording import Recording, StampedSignal
+from valve_friction_ros.model.valve import Valve
+from valve_friction_ros.signals import (
+    quantisation_step,
+    runs_of,
+    sensor_noise,
+    stamped_noise,
+    without_repeats,
+)
+
+_MEAN = 0.1
+"""Time, s, over which the stem is averaged."""
+
+_NEAR = 2e-3
+"""Share of the range within which the stem is at its end: a seat gives way a little."""
+
+_NOISE = 6.0
+"""Deviations of the averaged stem's noise within which it is there, too."""
+
+_LEFT = 2.0
+"""Distance from the end, over that within which the stem is there, at which it has left it."""
+
+_SURELY = 2.0
+"""Growth of the force over F_s − F_c: a stem that has jumped too far waits for twice as much."""
+
+_SMALLEST = 0.05
+"""Growth asked for at least, as a share of the force's range.
+
+Chosen: within the near part of the way the force grows by the spring, too."""
+_MOVING = 0.05
+"""Speed over the top speed from which the stem counts as moving."""
+
+_RECENT = 0.5
+"""Time, s, before an arrival from which the speed is taken: a lag of the stem is no longer."""
+
+
+def stem_reach(recording: Recording, valve: Valve, slip_force: float) -> dict[str, Measured]:
+    """Return the ends of the stem's motion, m, and which of them are stops.
+
+    A stem that has come to rest moves on as soon as the force has grown by F_s − F_c in the same
+    direction. Where it rests at an end of its motion and the force grows by far more, a stop holds
+    it. Where F_s − F_c is unknown, the rests between the ends show it; without one it is taken to
+    be no larger than F_c.
+
+    Parameters
+    ----------
+    recording : Recording
+        Drive and stem.
+    valve : Valve
+        Makes the force from the drive.
+    slip_force : float
+        Largest F_s − F_c that there may be, N; nan where it is unknown.
+
+    Returns
+    -------
+    dict
+        ``lowest_position`` and ``highest_position``; ``lower_stop`` and ``upper_stop`` where met.
+    """
+    mean = max(round(_MEAN / recording.sample_period), 1)
+    position = scipy.ndimage.uniform_filter1d(recording.position, mean, mode="nearest")
+    force = valve.actuator_force(
+        scipy.ndimage.uniform_filter1d(recording.drive, mean, mode="nearest")
+    )
+    noise = sensor_noise(recording.position) / math.sqrt(mean)
+    sent = recording.position if recording.stamped is None else recording.stamped.position.value
+    step = quantisation_step(sent)  # on the grid of the record it may be interpolated away
+    near = max(_NEAR * float(np.ptp(position)), _NOISE * noise, step)
+    least: NDArray[np.float64] = np.full(position.size, _SURELY * slip_force)
+    if math.isnan(slip_force):
+        least = _unknown_growth(position, force, recording.sample_period, near)
+    least = np.maximum(least, _SMALLEST * float(np.ptp(force)))
+    found = {}
+    for side, end, stop in (
+        (-1.0, "lowest_position", "lower_stop"),
+        (1.0, "highest_position", "upper_stop"),
+    ):
+        farthest = float(np.max(side * position))
+        found[end] = Measured(side * farthest, near)
+        held = _held(farthest - side * position, near, side * force, least)
+        if held.any():
+            low, middle, high = np.quantile(position[held], (0.025, 0.5, 0.975)).tolist()
+            found[stop] = Measured(middle, max(high - low, 0.5 * near))
+    return found
+
+
+def _unknown_growth(
+    position: NDArray[np.float64], force: NDArray[np.float64], period: float, near: float
+) -> NDArray[np.float64]:
+    """Return the growth of the force, N, that proves a stop where nothing is known of F_s − F_c.
+
+    It is F_c, or twice the largest F_s − F_c that a rest between the ends shows, and what the
+    viscous friction of an arrival, or a lag of the stem, add to it.
+    """
+    speed = np.gradient(position, period)
+    moving = np.abs(speed) > _MOVING * np.abs(speed).max()
+    coulomb, viscous = _friction(position[moving], speed[moving], force[moving])
+    growth = max(coulomb, _SURELY * _slip_of_rests(position, force, moving, near, coulomb))
+    recent = max(round(_RECENT / period), 1)
+    arriving = scipy.ndimage.maximum_filter1d(np.abs(speed), recent, origin=(recent - 1) // 2)
+    return growth + viscous * arriving
+
+
+def _friction(
+    position: NDArray[np.float64], speed: NDArray[np.float64], force: NDArray[np.float64]
+) -> tuple[float, float]:
+    """Return Coulomb (N) and viscous friction (N·s/m) of the moving stem, by least squares.
+
+    A lag of the stem adds to the viscous part. Where either comes out below zero, all is Coulomb's.
+    """
+    columns = [position - position.mean(), np.ones(position.size), np.sign(speed), speed]
+    (*_, coulomb, viscous), *_ = np.linalg.lstsq(np.column_stack(columns), force, rcond=None)
+    if min(coulomb, viscous) >= 0:
+        return float(coulomb), float(viscous)
+    (*_, loop), *_ = np.linalg.lstsq(np.column_stack(columns[:-1]), force, rcond=None)
+    return abs(float(loop)), 0.0
+
+
+def _slip_of_rests(
+    position: NDArray[np.float64],
+    force: NDArray[np.float64],
+    moving: NDArray[np.bool_],
+    near: float,
+    coulomb: float,
+) -> float:
+    """Return the largest F_s − F_c, N, that a rest between the ends shows; 0 without one.
+
+    The force changes by that before the stem moves on, and by F_s + F_c before it turns.
+    """
+    low, high = float(np.min(position)) + near, float(np.max(position)) - near
+    largest = 0.0
+    for begin, end in runs_of(~moving):
+        if begin > 0 and end < moving.size and low < position[begin] < high:
+            before = position[begin] - position[begin - 1]
+            after = position[end] - position[end - 1]
+            change = abs(force[end] - force[begin])
+            largest = max(largest, change - (2 * coulomb if before * after < 0 else 0.0))
+    return largest
+
+
+def _held(
+    below_end: NDArray[np.float64],
+    near: float,
+    force: NDArray[np.float64],
+    least: NDArray[np.float64],
+) -> NDArray[np.bool_]:
+    """Return the visits of an end in which the force grows by more than `least` after arrival.
+
+    A visit lasts until the stem is twice as far `below_end` as it was on arrival: noise ends none,
+    so that a force which falls and grows again while the stem rests proves no stop. Nothing is
+    known of the arrival of a visit with which the record begins.
+    """
+    held = np.zeros(below_end.size, dtype=np.bool_)
+    for first, last in runs_of(below_end < _LEFT * near):
+        (there,) = np.nonzero(below_end[first:last] <= near)
+        if first == 0 or there.size == 0:
+            continue
+        begin, end = first + int(there[0]), first + int(there[-1]) + 1
+        if np.max(force[begin:end]) - force[begin] > least[begin]:
+            held[begin:end] = True
+    return held
+
+
+_FEWEST = 200
+_LIKE_WHITE = 1.25
+"""Noise of every second sample over that of all, up to which it counts.
+
+It is 1 for white noise. Where it is more, the noise has a memory, or the signal itself moves as
+much from sample to sample: the number then depends on rate and drive, and not on the sensor."""
+
+_FINEST = 1e-4
+"""Share of the signal's range below which a noise is not told apart from none."""
+
+
+def sensor_noises(recording: Recording) -> dict[str, Measured]:
+    """Return ``drive_noise`` (Pa or N) and ``stem_noise`` (m), standard deviations.
+
+    One that depends on rate or drive is left out. Of one below the resolution, which grows with the
+    stroke, only that is known: its interval goes from zero to the resolution.
+    """
+    if (stamped := recording.stamped) is not None:
+        signals = stamped.drive, stamped.position
+    elif len(recording) >= _FEWEST:
+        time = recording.time
+        drive, position = recording.drive, recording.position
+        signals = StampedSignal(time, drive), StampedSignal(time, position)
+    else:
+        return {}
+    named = zip(("drive_noise", "stem_noise"), map(_noise, signals), strict=True)
+    return {name: noise for name, noise in named if noise is not None}
+
+
+def _noise(signal: StampedSignal) -> Measured | None:
+    fresh = without_repeats(signal)
+    if fresh.time.size < _FEWEST:
+        return None
+    noise = stamped_noise(fresh)
+    sparse = stamped_noise(StampedSignal(fresh.time[::2], fresh.value[::2]))
+    finest = _FINEST * float(np.ptp(fresh.value))
+    if sparse > _LIKE_WHITE * max(noise, finest):
+        return None
+    if noise < finest:
+        return Measured(0.5 * finest, 0.5 * finest)
+    chance = 2.0 * noise / math.sqrt(fresh.time.size)
+    return Measured(noise, math.hypot(chance, sparse - noise))
+
 
 SHARED = "sliding_friction_shared"
 """Part of the half width of a sliding friction, N, by which other records are wrong alike."""
@@ -159,3 +377,47 @@ def _imperfections(
         doubt = known["viscous_friction"].half_width / known["spring_constant"].value
         found["lag"] = Measured(lag.value, math.hypot(lag.half_width, doubt))
     return found
+
+
+class RefusedRecordError(RefusalError):
+    """A refusal, with what its record shows all the same.
+
+    Attributes
+    ----------
+    numbers : mapping of str to Measured
+        Numbers of the valve by name, SI units (`numbers_of_refused`).
+    is_fault : bool
+        Whether the record cannot be used, rather than shows too little motion.
+    """
+
+    def __init__(
+        self, message: str, numbers: Mapping[str, Measured], is_fault: bool = True
+    ) -> None:
+        super().__init__(message)
+        self.numbers, self.is_fault = numbers, is_fault
+
+    def __reduce__(self) -> tuple[object, ...]:
+        """Let it pass from process to process."""
+        return type(self), (str(self), self.numbers, self.is_fault)
+
+
+def numbers_of_refused(
+    recording: Recording, valve: Valve, settings: IdentificationSettings
+) -> dict[str, Measured]:
+    """Return what a refused record shows of its valve: noise of the sensors, ends of the stem.
+
+    Signals of an impossible size say nothing. The ends of the stem's motion are there only where
+    the stem moved both ways and with the drive.
+    """
+    numbers: dict[str, Measured] = {}
+    with contextlib.suppress(RefusalError, ValueError):
+        require_drive(recording, valve)
+        require_plausible_units(recording, valve, settings)
+        require_within_travel(recording, valve)
+        numbers |= sensor_noises(recording)
+        require_motion(recording)
+        require_two_directions(recording, settings.published_window, valve.travel)
+        require_travel(recording, valve)
+        require_related_signals(recording)
+        numbers |= stem_reach(recording, valve, math.nan)
+    return numbers

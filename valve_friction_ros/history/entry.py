@@ -24,7 +24,7 @@ from valve_friction_ros.health.diagnosis import Diagnosis, FrictionLimits
 from valve_friction_ros.health.friction_monitor import FrictionMonitor, MonitorSettings
 from valve_friction_ros.health.levels import Level
 from valve_friction_ros.health.measured import DatedNumber, Measured
-from valve_friction_ros.health.refused_record import RefusedRecordError
+from valve_friction_ros.health.valve_numbers import RefusedRecordError
 from valve_friction_ros.identification import (
     SLIDING,
     Parameter,

@@ -37,8 +37,7 @@ from valve_friction_ros.health.diagnosis import (
 )
 from valve_friction_ros.health.known_numbers import KnownNumbers
 from valve_friction_ros.health.levels import Level, StatusSignal
-from valve_friction_ros.health.measured import Measured
-from valve_friction_ros.health.valve_changes import DIFFERENCES, RATIOS
+from valve_friction_ros.health.measured import DIFFERENCES, RATIOS, Measured
 from valve_friction_ros.history import tables
 from valve_friction_ros.history.entry import (
     AlarmRecording,

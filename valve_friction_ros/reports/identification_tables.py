@@ -22,7 +22,7 @@ import scipy
 
 import valve_friction_ros
 from valve_friction_ros.health import Level, Measured, compared, dead_band, valve_changes
-from valve_friction_ros.health.valve_changes import DIFFERENCES
+from valve_friction_ros.health.measured import DIFFERENCES
 from valve_friction_ros.health.valve_numbers import comparable_numbers
 from valve_friction_ros.identification import (
     CALIBRATION,

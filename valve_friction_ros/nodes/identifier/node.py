@@ -35,7 +35,7 @@ from valve_friction_ros.health import (
     ValveLimits,
     by_severity,
 )
-from valve_friction_ros.health.valve_changes import DIFFERENCES
+from valve_friction_ros.health.measured import DIFFERENCES
 from valve_friction_ros.identification import STATED, RefusalError, require_valve_units
 from valve_friction_ros.nodes.identifier.alarm_board import AlarmBoard
 from valve_friction_ros.nodes.identifier.alarm_recorder import AlarmRecorder
