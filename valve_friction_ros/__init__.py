@@ -53,10 +53,14 @@ if TYPE_CHECKING:
     )
     from valve_friction_ros.identification.steps.step_response import step_test as step_test
     from valve_friction_ros.identification.steps.validation import validate as validate
-    from valve_friction_ros.model.instruments import SensorNoise as SensorNoise
-    from valve_friction_ros.model.karnopp_parameters import KarnoppParameters as KarnoppParameters
-    from valve_friction_ros.model.recording import Recording as Recording
-    from valve_friction_ros.model.valve import Valve as Valve
+    from valve_friction_ros.model.recording import (
+        Recording as Recording,
+        SensorNoise as SensorNoise,
+    )
+    from valve_friction_ros.model.valve import (
+        KarnoppParameters as KarnoppParameters,
+        Valve as Valve,
+    )
     from valve_friction_ros.records.valve_file import read_valve_file as read_valve_file
 else:
     __getattr__ = names_on_demand(__name__)

@@ -22,11 +22,10 @@ from valve_friction_ros.health.diagnosis import Diagnosis, FrictionLimits
 from valve_friction_ros.health.valve_diagnosis import diagnose_valve
 from valve_friction_ros.identification.result import Result
 from valve_friction_ros.model.drive import Drive
-from valve_friction_ros.model.karnopp_parameters import KarnoppParameters
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.simulation import StemState, Trajectory
 from valve_friction_ros.model.simulation import simulate as simulated
-from valve_friction_ros.model.valve import Valve
+from valve_friction_ros.model.valve import KarnoppParameters, Valve
 from valve_friction_ros.records.recordings import ReadingOptions, read_recordings
 from valve_friction_ros.streams.samples import Samples, uniform_recording
 

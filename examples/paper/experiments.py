@@ -28,7 +28,7 @@ from valve_friction_ros.identification import (
     sweep_thresholds,
 )
 from valve_friction_ros.identification.published.identify import choose_threshold
-from valve_friction_ros.identification.published.regression import force_balance_regression
+from valve_friction_ros.identification.published.sweep import force_balance_regression
 from valve_friction_ros.model import (
     Excitation,
     IsaSteps,

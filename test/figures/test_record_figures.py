@@ -40,7 +40,7 @@ from valve_friction_ros.identification import (
     identify_signature,
     validate,
 )
-from valve_friction_ros.identification.friction_drawing import (
+from valve_friction_ros.identification.drawing import (
     FRICTION_CURVE,
     IMPERFECTIONS_FOUND,
     friction_drawing,

@@ -15,6 +15,7 @@ from valve_friction_ros.on_demand import names_on_demand
 
 if TYPE_CHECKING:
     from valve_friction_ros.identification.drawing import (
+        IMPERFECTIONS_FOUND as IMPERFECTIONS_FOUND,
         Curve as Curve,
         Drawing as Drawing,
         Exhibit as Exhibit,
@@ -27,18 +28,17 @@ if TYPE_CHECKING:
         identify_bench as identify_bench,
         identify_plant as identify_plant,
     )
-    from valve_friction_ros.identification.friction_drawing import (
-        IMPERFECTIONS_FOUND as IMPERFECTIONS_FOUND,
-    )
     from valve_friction_ros.identification.methods import (
         METHODS as METHODS,
         Method as Method,
         identify as identify,
         method_named as method_named,
     )
-    from valve_friction_ros.identification.model_to_simulate import (
+    from valve_friction_ros.identification.steps.validation import (
         IdentifiedModel as IdentifiedModel,
+        Validation as Validation,
         identified_model as identified_model,
+        validate as validate,
     )
     from valve_friction_ros.identification.published.estimate import (
         Estimate as Estimate,
@@ -95,10 +95,6 @@ if TYPE_CHECKING:
         StepTest as StepTest,
         find_steps as find_steps,
         step_test as step_test,
-    )
-    from valve_friction_ros.identification.steps.validation import (
-        Validation as Validation,
-        validate as validate,
     )
     from valve_friction_ros.identification.trust.misfit import (
         LEAST_FIT as LEAST_FIT,

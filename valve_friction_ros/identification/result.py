@@ -18,10 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from valve_friction_ros.identification import rendering
-from valve_friction_ros.identification.drawing import Drawing, Exhibit
-from valve_friction_ros.identification.friction_drawing import (
+from valve_friction_ros.identification.drawing import (
     FRICTION_CURVE,
     IMPERFECTIONS_FOUND,
+    Drawing,
+    Exhibit,
     friction_drawing,
 )
 from valve_friction_ros.identification.published.estimate import Estimate
@@ -39,10 +40,9 @@ from valve_friction_ros.identification.trust.uncertainty import CORRELATION
 from valve_friction_ros.identification.trust.verdict import Parameter
 from valve_friction_ros.identification.units import SLIDING
 from valve_friction_ros.model.checks import frozen
-from valve_friction_ros.model.karnopp_parameters import KarnoppParameters
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.simulation import simulate
-from valve_friction_ros.model.valve import Valve
+from valve_friction_ros.model.valve import KarnoppParameters, Valve
 
 if TYPE_CHECKING:
     import pandas as pd

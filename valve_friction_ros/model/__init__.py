@@ -29,12 +29,15 @@ if TYPE_CHECKING:
         SquareWave as SquareWave,
         TriangleWave as TriangleWave,
     )
-    from valve_friction_ros.model.instruments import (
+    from valve_friction_ros.model.recording import (
+        Recording as Recording,
         SensorNoise as SensorNoise,
         converter_response as converter_response,
     )
-    from valve_friction_ros.model.karnopp_parameters import KarnoppParameters as KarnoppParameters
-    from valve_friction_ros.model.recording import Recording as Recording
+    from valve_friction_ros.model.valve import (
+        KarnoppParameters as KarnoppParameters,
+        Valve as Valve,
+    )
     from valve_friction_ros.model.simulation import (
         StemState as StemState,
         Trajectory as Trajectory,
@@ -43,6 +46,5 @@ if TYPE_CHECKING:
         compile_kernels as compile_kernels,
         simulate as simulate,
     )
-    from valve_friction_ros.model.valve import Valve as Valve
 else:
     __getattr__ = names_on_demand(__name__)

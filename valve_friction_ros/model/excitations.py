@@ -24,8 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from valve_friction_ros.model.checks import require_finite, require_positive
-from valve_friction_ros.model.karnopp_parameters import KarnoppParameters
-from valve_friction_ros.model.valve import Valve
+from valve_friction_ros.model.valve import KarnoppParameters, Valve
 
 PRESSURE_RANGE = (41740.0, 206840.0)
 """Input range of the bench, Pa: 0 % and 100 % of the paper's excitations."""

@@ -21,11 +21,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from valve_friction_ros.model.checks import require_finite, require_positive
-from valve_friction_ros.model.dynamics import Dynamics
-from valve_friction_ros.model.karnopp_parameters import KarnoppParameters
+from valve_friction_ros.model.linear_motion import Dynamics
 from valve_friction_ros.model.stem_motion import advance_stem
 from valve_friction_ros.model.stem_run import run_stem
-from valve_friction_ros.model.valve import Valve
+from valve_friction_ros.model.valve import KarnoppParameters, Valve
 
 
 @dataclass(frozen=True)

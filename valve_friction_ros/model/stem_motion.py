@@ -18,12 +18,13 @@ friction of the two directions may differ. Chords follow friction that falls wit
 import math
 
 from valve_friction_ros.model.compiled import compiled
-from valve_friction_ros.model.dynamics import Dynamics, sliding_friction
 from valve_friction_ros.model.linear_motion import (
+    Dynamics,
     Motion,
     first_turn,
     impulse_response,
     motion_after,
+    sliding_friction,
 )
 from valve_friction_ros.model.stem_tangent import (
     LET_GO,

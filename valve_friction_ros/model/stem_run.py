@@ -22,8 +22,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from valve_friction_ros.model.compiled import compiled, compiled_products
-from valve_friction_ros.model.dynamics import Dynamics, friction_fall, sliding_friction
-from valve_friction_ros.model.linear_motion import impulse_response, self_convolution
+from valve_friction_ros.model.linear_motion import (
+    Dynamics,
+    friction_fall,
+    impulse_response,
+    self_convolution,
+    sliding_friction,
+)
 from valve_friction_ros.model.stem_motion import STRIBECK_STEP, advance_stem
 from valve_friction_ros.model.stem_tangent import Tangent, begin_step, face, keep, set_anew
 

@@ -30,12 +30,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from valve_friction_ros.model.compiled import compiled
-from valve_friction_ros.model.dynamics import Dynamics, friction_fall, sliding_friction
 from valve_friction_ros.model.linear_motion import (
+    Dynamics,
     Motion,
+    friction_fall,
     impulse_response,
     motion_after,
     self_convolution,
+    sliding_friction,
 )
 
 _STEEPEST = 4.0

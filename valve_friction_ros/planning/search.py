@@ -31,11 +31,9 @@ from valve_friction_ros.identification.trust.sliding import mean_sliding_frictio
 from valve_friction_ros.identification.trust.verdict import FALL_SPEED
 from valve_friction_ros.identification.units import SLIDING
 from valve_friction_ros.model.excitations import Excitation
-from valve_friction_ros.model.instruments import SensorNoise, converter_response
-from valve_friction_ros.model.karnopp_parameters import KarnoppParameters
-from valve_friction_ros.model.recording import Recording
+from valve_friction_ros.model.recording import Recording, SensorNoise, converter_response
 from valve_friction_ros.model.simulation import Trajectory, simulate
-from valve_friction_ros.model.valve import Valve
+from valve_friction_ros.model.valve import KarnoppParameters, Valve
 from valve_friction_ros.planning.conditions import AIMS, Conditions, Limits
 from valve_friction_ros.planning.stroke_test import (
     LEAST_STROKE,

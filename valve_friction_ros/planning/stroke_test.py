@@ -24,8 +24,7 @@ from numpy.typing import NDArray
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.model.checks import require_finite, require_non_negative, require_positive
 from valve_friction_ros.model.excitations import SampledPressure
-from valve_friction_ros.model.karnopp_parameters import KarnoppParameters
-from valve_friction_ros.model.valve import Valve
+from valve_friction_ros.model.valve import KarnoppParameters, Valve
 from valve_friction_ros.planning.conditions import Limits
 
 _USUAL_DELAY = 0.1

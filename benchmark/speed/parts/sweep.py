@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from benchmark.harness.rows import Row
 from benchmark.speed.measuring import VALVES, Settings, medians, noisy_record
 from valve_friction_ros.identification import IdentificationSettings, sweep_thresholds
-from valve_friction_ros.identification.published.regression import (
+from valve_friction_ros.identification.published.sweep import (
     ForceBalanceRegression,
     force_balance_regression,
 )

@@ -26,20 +26,19 @@ from valve_friction_ros.identification import (
 )
 from valve_friction_ros.identification.published import identify
 from valve_friction_ros.identification.published.estimate import possible_model
-from valve_friction_ros.identification.published.evidence import (
-    sweep_evidence,
-    sweep_finding,
-    with_published,
-)
 from valve_friction_ros.identification.published.identify import (
     Breakaway,
     _mass_by_shorter_window,
     _why_mass_is_unknown,
     choose_threshold,
 )
-from valve_friction_ros.identification.published.method import identify_published
-from valve_friction_ros.identification.published.regression import force_balance_regression
-from valve_friction_ros.identification.published.sweep import Sweep
+from valve_friction_ros.identification.published.method import (
+    identify_published,
+    sweep_evidence,
+    sweep_finding,
+    with_published,
+)
+from valve_friction_ros.identification.published.sweep import Sweep, force_balance_regression
 from valve_friction_ros.model import (
     BENCH_VALVE,
     HIGH_FRICTION,

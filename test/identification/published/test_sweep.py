@@ -24,7 +24,7 @@ from valve_friction_ros.identification.published.identify import (
     _onset,
     find_breakaways,
 )
-from valve_friction_ros.identification.published.regression import (
+from valve_friction_ros.identification.published.sweep import (
     ForceBalanceRegression,
     force_balance_regression,
 )

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from valve_friction_ros.model.compiled import compiled
-from valve_friction_ros.model.dynamics import Dynamics
+from valve_friction_ros.model.linear_motion import Dynamics
 from valve_friction_ros.model.stem_run import run_stem
 from valve_friction_ros.model.stem_tangent import Tangent, no_tangent
 

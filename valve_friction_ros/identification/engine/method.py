@@ -18,6 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from valve_friction_ros.identification.drawing import FRICTION_CURVE, IMPERFECTIONS_FOUND
 from valve_friction_ros.identification.engine.balance_regression import SECOND_ORDER
 from valve_friction_ros.identification.engine.departures import Departed, static_friction
 from valve_friction_ros.identification.engine.fitted_record import fitted_record
@@ -58,8 +59,7 @@ from valve_friction_ros.identification.engine.verdicts import (
     fit_misfit,
     fit_verdicts,
 )
-from valve_friction_ros.identification.friction_drawing import FRICTION_CURVE, IMPERFECTIONS_FOUND
-from valve_friction_ros.identification.published.evidence import (
+from valve_friction_ros.identification.published.method import (
     published_beside,
     sweep_evidence,
     sweep_finding,
@@ -101,9 +101,8 @@ from valve_friction_ros.identification.trust.verdict import (
     with_verdict,
 )
 from valve_friction_ros.identification.units import SLIDING
-from valve_friction_ros.model.karnopp_parameters import KarnoppParameters
 from valve_friction_ros.model.recording import Recording, StampedRecord, StampedSignal
-from valve_friction_ros.model.valve import Valve
+from valve_friction_ros.model.valve import KarnoppParameters, Valve
 from valve_friction_ros.signals import (
     MeasuredRecord,
     as_sent_on_change,

@@ -20,8 +20,7 @@ from valve_friction_ros.identification.published.sweep import Sweep
 from valve_friction_ros.identification.settings import IdentificationSettings
 from valve_friction_ros.identification.trust.verdict import Parameter
 from valve_friction_ros.identification.units import UNITS
-from valve_friction_ros.model.karnopp_parameters import KarnoppParameters
-from valve_friction_ros.model.valve import Valve
+from valve_friction_ros.model.valve import KarnoppParameters, Valve
 
 SETTLED_SHARE = 0.1
 """Largest difference of σ_s in the chosen region, over σ_s at the chosen threshold. Chosen."""

@@ -16,11 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from valve_friction_ros.identification.published.estimate import Estimate
-from valve_friction_ros.identification.published.regression import (
+from valve_friction_ros.identification.published.sweep import (
     ForceBalanceRegression,
+    Sweep,
     force_balance_regression,
+    sweep_thresholds,
 )
-from valve_friction_ros.identification.published.sweep import Sweep, sweep_thresholds
 from valve_friction_ros.identification.refusal import LittleMotionError
 from valve_friction_ros.identification.settings import IdentificationSettings
 from valve_friction_ros.identification.trust.excitation import (

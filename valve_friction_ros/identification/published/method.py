@@ -10,22 +10,67 @@
 """Method "published": the paper's model 1 as it is, without intervals."""
 
 import math
-from collections.abc import Container
+from collections.abc import Container, Mapping
+from dataclasses import replace
 
 from valve_friction_ros.identification.published.estimate import Estimate, possible_model
-from valve_friction_ros.identification.published.evidence import (
-    sweep_evidence,
-    sweep_finding,
-    with_published,
-)
 from valve_friction_ros.identification.published.identify import published_fit, require_published
+from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.identification.result import Result
 from valve_friction_ros.identification.settings import IdentificationSettings
+from valve_friction_ros.identification.trust.excitation import require_unbroken
 from valve_friction_ros.identification.trust.verdict import Parameter, Verdict, fixed
-from valve_friction_ros.identification.units import SLIDING
+from valve_friction_ros.identification.units import SLIDING, UNITS
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
-from valve_friction_ros.signals import measured
+from valve_friction_ros.signals import MeasuredRecord, measured
+
+
+def published_beside(
+    record: MeasuredRecord, valve: Valve, settings: IdentificationSettings
+) -> tuple[Estimate | None, list[str]]:
+    """Run the published method beside another one, which has checked the record.
+
+    Its refusal becomes a warning.
+    """
+    try:
+        require_unbroken(record)
+        return published_fit(record, valve, settings).estimate, []
+    except RefusalError as refusal:
+        return None, [f"the published method refused the record: {refusal}"]
+
+
+def sweep_evidence(estimate: Estimate) -> dict[str, float | int]:
+    """Return the figures of the chosen threshold, SI units."""
+    return {
+        "threshold": estimate.threshold,
+        "samples": estimate.samples,
+        "sigma": estimate.sigma,
+        "r_squared": estimate.r_squared,
+        "published_window": estimate.settings.published_window,
+    }
+
+
+def sweep_finding(estimate: Estimate) -> str:
+    """Return the figures of the chosen threshold as a sentence."""
+    return (
+        f"published: threshold δv {estimate.threshold:.4g} m/s, {estimate.samples} samples above "
+        f"it, σ_s {estimate.sigma:.4g} N, R² {estimate.r_squared:.6f}, window "
+        f"{estimate.settings.published_window} samples"
+    )
+
+
+def with_published(
+    parameters: Mapping[str, Parameter], estimate: Estimate | None
+) -> dict[str, Parameter]:
+    """Add the published value to each parameter of the Karnopp model."""
+    if estimate is None:
+        return dict(parameters)
+    return {
+        name: replace(each, published=estimate.values[name]) if name in UNITS else each
+        for name, each in parameters.items()
+    }
+
 
 METHOD = "published"
 """Name of this method."""

@@ -14,7 +14,6 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from valve_friction_ros.identification.model_to_simulate import IdentifiedModel, identified_model
 from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.identification.result import Result, StemComparison
 from valve_friction_ros.identification.settings import IdentificationSettings
@@ -32,7 +31,12 @@ from valve_friction_ros.identification.signature.valve_signature import (
     sliding_speed,
     valve_signature,
 )
-from valve_friction_ros.identification.steps.validation import Validation, validate
+from valve_friction_ros.identification.steps.validation import (
+    IdentifiedModel,
+    Validation,
+    identified_model,
+    validate,
+)
 from valve_friction_ros.identification.trust.excitation import (
     require_enough_samples,
     require_motion,

@@ -9,24 +9,113 @@
 
 """Validation: a recording simulated with an identified model, section 5 of the paper."""
 
-from dataclasses import dataclass, field
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from valve_friction_ros.identification.model_to_simulate import identified_model
 from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.identification.result import Result
+from valve_friction_ros.identification.settings import IdentificationSettings
 from valve_friction_ros.identification.trust.excitation import (
     require_drive,
     require_motion,
     require_unbroken,
 )
-from valve_friction_ros.model.karnopp_parameters import KarnoppParameters
+from valve_friction_ros.identification.units import UNITS
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.simulation import StemState, simulate
-from valve_friction_ros.model.valve import Valve
+from valve_friction_ros.model.valve import KarnoppParameters, Valve
 from valve_friction_ros.signals import measured
+
+_NEEDED = ("coulomb_friction", "spring_constant")
+_NAMES = tuple(field.name for field in fields(KarnoppParameters))
+
+
+class IdentifiedModel(NamedTuple):
+    """A model to simulate, and the substitutes for values that were not identified.
+
+    Attributes
+    ----------
+    parameters : KarnoppParameters
+        The model.
+    notes : tuple of str
+        One sentence for each substitute.
+    """
+
+    parameters: KarnoppParameters
+    notes: tuple[str, ...]
+
+
+def identified_model(
+    values: Mapping[str, float], known: Mapping[str, float] | None = None
+) -> IdentifiedModel:
+    """Build a model from identified values; substitutes replace missing values.
+
+    Parameters
+    ----------
+    values : mapping of str to float
+        Identified values by name; nan where a value is not identifiable.
+    known : mapping of str to float, optional
+        Nominal values to substitute, such as those of a valve file. Without a nominal value the
+        mass is `IdentificationSettings.assumed_mass`, F_s is F_c, and F_v is 2·√(k·m), critical
+        damping: the smallest F_v without oscillation.
+
+    Returns
+    -------
+    IdentifiedModel
+        The model and notes.
+
+    Raises
+    ------
+    RefusalError
+        If F_c or k is missing, or if F_0 is missing and has no nominal value.
+    ValueError
+        If a value is impossible; the message names it.
+    """
+    nominal = known or {}
+    found = {name: value for name, value in values.items() if math.isfinite(value)}
+    for name in _NEEDED:
+        if name not in found:
+            raise RefusalError(
+                f"{name} was not identified, and a model needs it: identify a record that "
+                "determines it"
+            )
+    notes = []
+    if found.get("viscous_friction", 0.0) < 0:
+        notes.append(f"viscous_friction is negative ({found.pop('viscous_friction'):.4g} N·s/m)")
+    if "spring_preload" not in found and "spring_preload" not in nominal:
+        raise RefusalError(
+            "spring_preload was not identified, and a model needs it: name it in the valve file, "
+            "or identify a record that determines it"
+        )
+    mass = found.get("mass", nominal.get("mass", IdentificationSettings().assumed_mass))
+    substitutes = {
+        "mass": (mass, "assumed"),
+        "viscous_friction": (
+            2 * math.sqrt(found["spring_constant"] * mass),
+            "critical damping, the smallest value without oscillation",
+        ),
+        "static_friction": (found["coulomb_friction"], "the coulomb_friction"),
+        "spring_preload": (0.0, ""),
+    }
+    for name, (value, why) in substitutes.items():
+        if name not in found:
+            found[name] = nominal.get(name, value)
+            source = "of the valve file" if name in nominal else why
+            notes.append(f"{name} is not identified: {found[name]:.6g} {UNITS[name]}, {source}")
+    if found["static_friction"] < found["coulomb_friction"]:
+        notes.append(
+            f"static_friction ({found['static_friction']:.6g} N) lies below coulomb_friction: "
+            "the model takes F_s equal to F_c"
+        )
+        found["static_friction"] = found["coulomb_friction"]
+    model = {name: value for name, value in found.items() if name in _NAMES}
+    return IdentifiedModel(KarnoppParameters(**model), tuple(notes))
+
 
 _START_TIME = 0.1
 """Longest part of the record, s, that gives the start. Chosen: the speed changes little within it;

@@ -12,7 +12,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from valve_friction_ros.model.karnopp_parameters import KarnoppParameters
+from valve_friction_ros.model.valve import KarnoppParameters
 
 COMPARABLE = "comparable"
 """Name of the evidence by which the sliding frictions of two records are compared.
