@@ -25,21 +25,21 @@ from typing import Any
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from benchmark.alarms import GROWTH, AlarmCounts, diagnosed
 from benchmark.bounds import (
+    GROWTH,
+    AlarmCounts,
     alarm_bounds,
     by_case,
     case_bounds,
     coverage_bounds,
     default_bounds,
+    diagnosed,
+    emps_bounds,
 )
-from benchmark.cases import CONDITIONS, EXCITATIONS, NOISES, Case
-from benchmark.emps import emps_bounds
+from benchmark.cases import CONDITIONS, EXCITATIONS, NOISES, PLANTS, Case
 from benchmark.harness.rows import Bound
-from benchmark.information import Information, information
-from benchmark.plants import PLANTS
 from benchmark.report import bounds_table, cases_table, draw, information_table
-from benchmark.runs import Outcome, run
+from benchmark.runs import Information, Outcome, information, run
 from valve_friction_ros.identification import DEFAULT_METHOD
 
 PARTS = ("cases", "coverage", "default", "alarms", "emps", "information", "timing")

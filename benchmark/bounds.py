@@ -10,15 +10,143 @@
 """What an identification must reach, checked on the outcomes."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
 
 import numpy as np
 
-from benchmark.alarms import AlarmCounts
-from benchmark.cases import Case
+from benchmark.cases import EXCITATIONS, NOISES, PERIOD, Case
 from benchmark.harness.rows import Bound
-from benchmark.runs import Outcome, wrong_claims
-from valve_friction_ros.identification import Verdict
+from benchmark.runs import SETTINGS, Outcome, wrong_claims
+from valve_friction_ros.health import Baseline, FrictionLimits, diagnose
+from valve_friction_ros.identification import (
+    IdentificationSettings,
+    RefusalError,
+    Result,
+    Verdict,
+    identify,
+    identify_bench,
+)
+from valve_friction_ros.model import (
+    BENCH_VALVE,
+    LOW_FRICTION,
+    Drive,
+    Recording,
+    SensorNoise,
+    Valve,
+    converter_response,
+    simulate,
+)
+
+RECORD = (
+    Path(__file__).resolve().parents[2] / "shared" / "data" / "emps" / "emps_identification.csv"
+)
+
+PUBLISHED = {
+    "mass": 95.1089,
+    "viscous_friction": 203.5034,
+    "coulomb_friction": 20.3935,
+    "spring_preload": -3.1648,
+}
+"""IDIM-LS values of the data set's authors."""
+
+
+def emps_bounds() -> list[Bound] | None:
+    """Identify EMPS with default settings and no spring; None where the record is absent."""
+    if not RECORD.is_file():
+        return None
+    time, force, position = np.loadtxt(RECORD, delimiter=",", skiprows=1, unpack=True)
+    record = Recording(float(np.median(np.diff(time))), force, position, driven_by=Drive.FORCE)
+    settings = IdentificationSettings(fixed={"spring_constant": 0.0})
+    result = identify(record, Valve(), settings)
+    bounds = []
+    for name, published in PUBLISHED.items():
+        one = result.parameters[name]
+        error = one.value / published - 1
+        inside = abs(one.value - published) <= one.half_width
+        shown = one.verdict is not Verdict.NOT_IDENTIFIABLE
+        what = f"EMPS: {name} within 2 % of {published:g}, or inside its interval"
+        reached = f"{one.value:.4g} ± {one.half_width:.2g}, {error:+.1%}, {one.verdict.value}"
+        bounds.append(Bound(what, reached, shown and (abs(error) <= 0.02 or inside)))
+    return bounds
+
+
+GROWTH = 1.5
+"""Friction of the valve whose packing was tightened, over that of the unchanged one."""
+
+_BASELINE_SEED = 1_000_000
+
+
+@dataclass(frozen=True)
+class Diagnosed:
+    """The diagnosis of one identification.
+
+    Attributes
+    ----------
+    side : str
+        "high" or "low" for an alarm, else empty.
+    ratio : float
+        Friction over the baseline; nan where none was identified.
+    """
+
+    side: str
+    ratio: float
+
+
+@dataclass(frozen=True)
+class AlarmCounts:
+    """All identifications of the two valves.
+
+    Attributes
+    ----------
+    unchanged : list of str
+        Alarm of each identification of the unchanged valve.
+    declared : list of bool
+        Whether growth was declared, for each pair of identifications.
+    ratios : tuple of list of float
+        Friction over the baseline, of either valve.
+    """
+
+    unchanged: list[str]
+    declared: list[bool]
+    ratios: tuple[list[float], list[float]]
+
+
+@cache
+def _clean(growth: float) -> Recording:
+    command, duration = EXCITATIONS["square"]
+    pressure = converter_response(command(np.arange(round(duration / PERIOD)) * PERIOD), PERIOD)
+    friction = growth * LOW_FRICTION.coulomb_friction
+    valve = replace(LOW_FRICTION, coulomb_friction=friction, static_friction=friction)
+    return Recording(PERIOD, pressure, simulate(BENCH_VALVE, valve, pressure, PERIOD).position)
+
+
+def _identified(growth: float, seed: int) -> Result:
+    noise = NOISES["28.6 µm"]
+    recording = SensorNoise(noise.position, noise.pressure, seed).applied_to(_clean(growth))
+    return identify_bench(recording, BENCH_VALVE, SETTINGS)
+
+
+@cache
+def _baseline() -> Baseline:
+    return Baseline.of(_identified(1.0, _BASELINE_SEED))
+
+
+def diagnosed(growth: float, seed: int) -> Diagnosed:
+    """Identify a valve with its friction grown, and diagnose it by the unchanged one."""
+    try:
+        result = _identified(growth, seed)
+    except RefusalError:
+        return Diagnosed("", float("nan"))
+    limits = FrictionLimits()
+    ratio = diagnose(result, BENCH_VALVE, _baseline(), limits).ratio
+    if ratio is None:
+        return Diagnosed("", float("nan"))
+    if ratio.low >= limits.warn_ratio:
+        return Diagnosed("high", ratio.value)
+    return Diagnosed("low" if ratio.high <= limits.low_ratio else "", ratio.value)
+
 
 COVERAGE = (0.90, 0.99)
 """Shares of the records between which a 95 % interval covers the truth."""

@@ -19,11 +19,17 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from rich.table import Table
 
-from benchmark.alarms import AlarmCounts
-from benchmark.bounds import COVERAGE, FORCE_BOUND, by_case, case_bounds, coverage_of, worst
+from benchmark.bounds import (
+    COVERAGE,
+    FORCE_BOUND,
+    AlarmCounts,
+    by_case,
+    case_bounds,
+    coverage_of,
+    worst,
+)
 from benchmark.harness.rows import Bound
-from benchmark.information import Information
-from benchmark.runs import Outcome
+from benchmark.runs import Information, Outcome
 from valve_friction_ros.health import FrictionLimits
 
 _SHOWN = ("coulomb_friction", "viscous_friction", "spring_constant", "static_friction")

@@ -11,18 +11,135 @@
 
 import argparse
 import contextlib
+import os
+import random
 import signal
 import sys
 import time
-from collections.abc import Iterator, Sequence
+import traceback
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
-from benchmark.churn.crowd import Crowd
-from benchmark.churn.places import nodes, process_of
 from benchmark.churn.summary import hung_services, rows
-from benchmark.harness.processes import Process, Usage
+from benchmark.churn.visitor import audit, nodes, process_of, visit
+from benchmark.harness.processes import CODES, Process, Usage
 from benchmark.harness.rows import Row
 from benchmark.harness.run import Ledger, endured, run_parser
+
+_PAUSE = 1.2
+"""Mean time between two visitors that come, s."""
+_KILLED = 0.3
+"""Share of the visitors that are killed in the midst of something."""
+_LONGEST_LIFE = 5.0
+"""Time, s, within which they are."""
+_VISIT_LIMIT = 120.0
+"""Time, s, after which a visitor hangs."""
+_ENDING_PAUSE = 10.0
+_FIRST_SECONDS = 3.0
+_LONGEST_RUN = 12.0
+
+
+def _forked(work: Callable[[], None], ledger: Ledger, name: str) -> int:
+    """Do some work in a child of this process; return its number."""
+    child = os.fork()
+    if child:
+        return child
+    code = 1
+    try:
+        work()
+        code = 0
+    except BaseException as error:  # noqa: BLE001 - a child must never go on as its parent
+        ledger.add("broken", name=name, error=repr(error), trace=traceback.format_exc())
+    finally:
+        os._exit(code)
+
+
+def _endings(ledger: Ledger, folder: Path, seed: int, seconds: float) -> None:
+    """Start one node after the other, and end it at any time, often in its first seconds."""
+    chance, until, number = random.Random(seed), time.monotonic() + seconds, 0
+    kinds = nodes(folder, "/fv_301", ("/fv_401", "/fv_402"))
+    while time.monotonic() < until:
+        number += 1
+        name = chance.choice(sorted(kinds))
+        log = folder / f"ending_{number}_{name}.log"
+        process = Process(kinds[name], log)
+        within = _FIRST_SECONDS if chance.random() < 0.6 else _LONGEST_RUN
+        time.sleep(alive := chance.uniform(0.0, within))
+        request = chance.choice((signal.SIGINT, signal.SIGTERM))
+        took, code = process.end(request), process.exit_code()
+        known = {"node": name, "request": request.name, "alive": alive, "seconds": took}
+        words = "" if code in CODES else process.said()[-2000:]
+        ledger.add("ending", **known, code=code, words=words)
+        if code in CODES:
+            log.unlink()
+        time.sleep(chance.uniform(0.0, _ENDING_PAUSE))
+
+
+class Crowd:
+    """Who comes and goes.
+
+    The process that holds it must not start ROS itself: it is forked again and again.
+    """
+
+    def __init__(self, ledger: Ledger, seed: int, at_once: int) -> None:
+        self._ledger, self._at_once = ledger, at_once
+        self._chance = random.Random(seed)
+        self._visitors: dict[int, tuple[float, bool]] = {}
+        """Visitors that are there: until when, and whether they are killed then."""
+        self._others: list[int] = []
+        self._count, self._next = 0, 0.0
+
+    def begin(self, folder: Path, seconds: float) -> None:
+        """Let the auditor come, and who ends nodes."""
+        seed = self._chance.randrange(2**31)
+        works = {
+            "audit": lambda: audit(self._ledger, seconds),
+            "endings": lambda: _endings(self._ledger, folder, seed, seconds),
+        }
+        self._others = [_forked(work, self._ledger, name) for name, work in works.items()]
+
+    def turn(self) -> None:
+        """Kill whom it is time for, see who has gone, and let others come."""
+        now = time.monotonic()
+        for child, (until, is_killed) in list(self._visitors.items()):
+            ended, status = os.waitpid(child, os.WNOHANG)
+            if not ended and now > until:
+                self._kill(child, "killed" if is_killed else "hung")
+            elif ended:
+                self._ledger.add("visit", end="gone" if status == 0 else f"status {status}")
+            if ended or now > until:
+                del self._visitors[child]
+        if len(self._visitors) < self._at_once and now > self._next:
+            self._next = now + self._chance.expovariate(1 / _PAUSE)
+            self._let_one_come(now)
+
+    def _kill(self, child: int, end: str) -> None:
+        os.kill(child, signal.SIGKILL)
+        os.waitpid(child, 0)
+        self._ledger.add("visit", end=end)
+
+    def _let_one_come(self, now: float) -> None:
+        self._count += 1
+        number, seed = self._count, self._chance.randrange(2**63)
+        is_killed = self._chance.random() < _KILLED
+        life = self._chance.uniform(0.0, _LONGEST_LIFE) if is_killed else _VISIT_LIMIT
+        child = _forked(
+            lambda: visit(self._ledger, number, random.Random(seed)), self._ledger, "visitor"
+        )
+        self._visitors[child] = now + life, is_killed
+
+    def end(self, patience: float = _VISIT_LIMIT) -> None:
+        """Wait until the auditor and the others are done; kill who does not go."""
+        until = time.monotonic() + patience
+        children = [*self._visitors, *self._others]
+        self._visitors, self._others = {}, []
+        for child in children:
+            while os.waitpid(child, os.WNOHANG)[0] == 0:
+                if time.monotonic() > until:
+                    self._kill(child, "hung")
+                    break
+                time.sleep(0.1)
+
 
 _TURN = 0.05
 _LOOK = 10.0

@@ -16,8 +16,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from benchmark.churn.places import process_of
-from benchmark.churn.visitor import ANSWER_LIMIT
+from benchmark.churn.visitor import ANSWER_LIMIT, process_of
 from benchmark.harness.processes import CODES
 from benchmark.harness.rows import Row, none, some, under
 from benchmark.harness.run import Events, by_kind

@@ -22,10 +22,9 @@ from rich.console import Console
 from rich.progress import track
 
 from benchmark.reality.motions import Kind
-from benchmark.reality.real import real_rows
 from benchmark.reality.records import Case
 from benchmark.reality.report import bounds, report
-from benchmark.reality.trial import Row, Task, rows_of, tried
+from benchmark.reality.trial import Row, Task, real_rows, rows_of, tried
 
 _PROCESSES = 2
 _PARTS = ("plain", "stickslip", "alarms")

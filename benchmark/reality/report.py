@@ -17,8 +17,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 from benchmark.harness.rows import Bound
-from benchmark.reality.real import RealRow
-from benchmark.reality.trial import CHANGES, SLIDING, Row
+from benchmark.reality.trial import CHANGES, SLIDING, RealRow, Row
 
 _WIDEST_ERROR, _LEAST_ERROR = 3.0, 0.02
 """An identified number is wrong if it is off by more half widths, and by more than this share."""

@@ -17,8 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from benchmark.reality.plants.kernel import GRID
-from benchmark.reality.plants.motion import Motion
+from benchmark.reality.plants.kernel import GRID, Motion
 
 
 @dataclass(frozen=True)

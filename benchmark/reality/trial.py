@@ -21,13 +21,96 @@ from pathlib import Path
 from typing import NamedTuple, TypeVar
 
 import numpy as np
+from scipy.signal import savgol_filter
 
 from benchmark.reality import package
-from benchmark.reality.least_squares import sliding_friction
 from benchmark.reality.motions import Kind
 from benchmark.reality.package import Answer, Number
 from benchmark.reality.records import Case, Record, make_record, save
 from benchmark.reality.truth import TrueValue
+
+EMPS = {"coulomb_friction": 20.3935, "viscous_friction": 203.5034}
+"""IDIM-LS values of the data set's authors: N, and N·s/m."""
+
+_NEAR, _NARROW = 0.10, 0.10
+_NEAR_EMPS = 0.03
+"""Largest error and half width of a cylinder's sliding friction; largest error of EMPS; shares."""
+
+
+class RealRow(NamedTuple):
+    """A number of a real machine beside what others say of it, SI unit.
+
+    `words` are verdict or refusal; `met` tells whether it is as near and narrow as it must be.
+    """
+
+    machine: str
+    name: str
+    known: float
+    value: float
+    half_width: float
+    words: str
+    met: bool
+
+
+def _real_row(
+    machine: str, name: str, known: float, answer: package.Answer, near: float, narrow: float
+) -> RealRow:
+    number = answer.numbers.get(name)
+    if number is None:
+        return RealRow(machine, name, known, math.nan, math.nan, answer.refusal[:60], False)
+    met = abs(number.value - known) <= near * known and number.half_width <= narrow * known
+    return RealRow(machine, name, known, number.value, number.half_width, number.verdict, met)
+
+
+def real_rows(folder: Path) -> Iterator[RealRow]:
+    """Identify what the folders ``cylinders`` and ``emps`` hold; one that is absent is left out.
+
+    Beside each cylinder ``half_loops.json`` holds half the distance, N, of the forces both ways.
+    """
+    known = folder / "cylinders" / "half_loops.json"
+    if known.is_file():
+        for machine, loop in json.loads(known.read_text(encoding="utf-8")).items():
+            answer = package.identify_file(known.parent / f"{machine}.csv.gz")
+            half = loop["half_loop_n"]
+            yield _real_row(machine, "sliding_friction", half, answer, _NEAR, _NARROW)
+    emps = folder / "emps" / "emps_identification.csv"
+    if emps.is_file():
+        answer = package.identify_file(emps)
+        for name, value in EMPS.items():
+            yield _real_row("EMPS", name, value, answer, _NEAR_EMPS, math.inf)
+
+
+_WINDOW = 0.15
+_SURELY = 0.2
+"""Length of the filter, s, and share of the top speed above which a sample surely slides."""
+
+
+def sliding_friction(record: Record) -> float:
+    """Return the sliding friction, N, at the distance-weighted speed; nan where none slides.
+
+    The actuator force is regressed on sgn v, v, x and 1. No lag, no interval, no doubt.
+    """
+    stamps, position = record.position.stamps / 1e9, record.position.values
+    pressure_stamps = record.pressure.stamps / 1e9
+    period = float(np.median(np.diff(stamps)))
+    time = np.arange(
+        max(stamps[0], pressure_stamps[0]), min(stamps[-1], pressure_stamps[-1]), period
+    )
+    window = 2 * max(round(_WINDOW / period / 2), 2) + 1
+    if time.size < window:
+        return math.nan
+    stem = np.interp(time, stamps, position)
+    pressure = np.interp(time, pressure_stamps, record.pressure.values)
+    place = savgol_filter(stem, window, 2)
+    speed = savgol_filter(stem, window, 2, deriv=1, delta=period)
+    force = record.nominal.diaphragm_area * savgol_filter(pressure, window, 2)
+    slides = np.abs(speed) > _SURELY * np.abs(speed).max()
+    columns = np.column_stack([np.sign(speed), speed, place, np.ones_like(speed)])[slides]
+    if columns.shape[0] < 4:
+        return math.nan
+    dry, viscous, *_ = np.linalg.lstsq(columns, force[slides], rcond=None)[0]
+    return float(dry + viscous * np.sum(speed**2) / np.sum(np.abs(speed)))
+
 
 SLIDING = "sliding_friction"
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmark.reality.plants.motion import Motion
+from benchmark.reality.plants.kernel import Motion
 from benchmark.reality.plants.parameters import Body, Friction, Law, Plant, Trend
 from benchmark.reality.sensors import Instruments
 

@@ -18,7 +18,7 @@ import time
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
-from benchmark.churn.places import BENCH
+from benchmark.churn.visitor import BENCH
 from benchmark.harness.postgres import why_no_server
 from benchmark.harness.processes import node, parameters
 from benchmark.harness.rows import Row

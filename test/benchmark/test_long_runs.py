@@ -21,16 +21,14 @@ import pytest
 from histories import SECOND, START, success
 from rich.console import Console
 
-from benchmark.churn.places import RATE
 from benchmark.churn.summary import hung_services
 from benchmark.churn.summary import rows as churn_rows
-from benchmark.churn.visitor import missing_samples
+from benchmark.churn.visitor import RATE, missing_samples
 from benchmark.harness.processes import Process
 from benchmark.harness.run import Ledger
-from benchmark.service.course import Task
+from benchmark.service.course import Task, stretches
 from benchmark.service.plants import PLANTS, Duty
 from benchmark.service.report import bounds_met, tables
-from benchmark.service.service import stretches
 from benchmark.service.trial import Number, Told
 from benchmark.soak.feed import PIECE, Feed
 from benchmark.soak.site import Database, Kept

@@ -24,16 +24,14 @@ from benchmark.reality.imperfections import (
     drawn_imperfections,
     instruments_of,
 )
-from benchmark.reality.least_squares import sliding_friction
 from benchmark.reality.motions import Kind, drawn_drive
 from benchmark.reality.package import Answer, Number
 from benchmark.reality.plants import Body, Friction, Law, Plant, Trend, move
-from benchmark.reality.plants.kernel import GRID, Loop
-from benchmark.reality.plants.motion import Motion
+from benchmark.reality.plants.kernel import GRID, Loop, Motion
 from benchmark.reality.records import Case, Nominal, Record, make_record
 from benchmark.reality.report import bounds, in_mode, is_useful, judged, report
 from benchmark.reality.sensors import Instruments, Sensor, Signal, Stamping, measured
-from benchmark.reality.trial import Row, Task, tried
+from benchmark.reality.trial import Row, Task, sliding_friction, tried
 from benchmark.reality.truth import TrueValue, truth_of
 from benchmark.reality.valves import DrawnValve, drawn_cylinder, drawn_valve
 

@@ -20,7 +20,7 @@ import numpy as np
 import pytest
 from records import simulated
 
-from benchmark.emps import PUBLISHED, RECORD
+from benchmark.bounds import PUBLISHED, RECORD
 from valve_friction_ros.identification import (
     DEFAULT_METHOD,
     FORMER_METHODS,

@@ -10,6 +10,7 @@
 """The motion of a valve under a drive, compiled once for each law of friction."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numba
@@ -18,7 +19,7 @@ from numpy.typing import NDArray
 
 from benchmark.reality.plants import laws
 from benchmark.reality.plants.laws import INNER, SLIDING, V, X
-from benchmark.reality.plants.parameters import ELEMENTS, Constants, Law
+from benchmark.reality.plants.parameters import ELEMENTS, STEPS, Constants, Law, Plant, constants
 
 GRID = 1e-4
 """Time between two points of the simulated signals, s."""
@@ -222,3 +223,90 @@ def runner_of(law: Law) -> Callable[..., Any]:
     if law not in _RUNNERS:
         _RUNNERS[law] = _runner(getattr(laws, law.value))
     return _RUNNERS[law]
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """True signals of a valve, `GRID` seconds apart.
+
+    Attributes
+    ----------
+    begin : float
+        Time of the first point, s; the record begins at 0.
+    pressure : ndarray of float, shape (n,)
+        Pressure where the sensor is, Pa.
+    position, friction : ndarray of float, shape (n,)
+        Position of the stem (m) and friction force (N, against upward motion).
+    distance, work : float
+        ∫|dx| (m) and ∫|F·dx| (J) of the record.
+    coulomb_by_distance, coulomb_by_time : float
+        F_c averaged over the distance slid and over the time of motion, N.
+    largest : float
+        Largest friction without its viscous part, N.
+    """
+
+    begin: float
+    pressure: NDArray[np.float64]
+    position: NDArray[np.float64]
+    friction: NDArray[np.float64]
+    distance: float
+    work: float
+    coulomb_by_distance: float
+    coulomb_by_time: float
+    largest: float
+
+    @property
+    def time(self) -> NDArray[np.float64]:
+        """Times of the points, s."""
+        times: NDArray[np.float64] = np.arange(self.position.size, dtype=np.float64)
+        return self.begin + GRID * times
+
+
+def move(
+    plant: Plant,
+    loop: Loop,
+    signal: NDArray[np.float64],
+    disturbance: NDArray[np.float64],
+    before: float,
+    step: float | None = None,
+) -> Motion:
+    """Move a valve.
+
+    Parameters
+    ----------
+    plant : Plant
+        The valve.
+    loop : Loop
+        Converter, and controller if there is one.
+    signal : ndarray of float, shape (n,)
+        Command or set point, 0 to 1, at the points of the grid.
+    disturbance : ndarray of float, shape (m,)
+        Noise of what the controller measures, 1, at each of its actions.
+    before : float
+        Time between the first point and the begin of the record, s.
+    step : float, optional
+        Largest time step, s; by default that of the law.
+
+    Returns
+    -------
+    Motion
+        Pressure, position and friction at all points; the sums only of the record.
+    """
+    law = plant.friction.law
+    substeps = int(np.ceil(GRID / (step or STEPS[law]) - 1e-9))
+    outputs, sums = np.empty((3, signal.size)), np.zeros(SUMS)
+    first = round(before / GRID)
+    fine = GRID / substeps
+    runner_of(law)(constants(plant), loop, signal, disturbance, fine, first, outputs, sums)
+    distance, work, by_distance, moving, by_time, largest = (float(one) for one in sums)
+    return Motion(
+        begin=-before,
+        pressure=outputs[0],
+        position=outputs[1],
+        friction=outputs[2],
+        distance=distance,
+        work=work,
+        coulomb_by_distance=by_distance / distance if distance else plant.friction.coulomb,
+        coulomb_by_time=by_time / moving if moving else plant.friction.coulomb,
+        largest=largest,
+    )

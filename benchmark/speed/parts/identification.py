@@ -15,9 +15,9 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 
+from benchmark.cases import PLANTS
 from benchmark.harness.processes import module
 from benchmark.harness.rows import Row
-from benchmark.plants import PLANTS
 from benchmark.speed.measuring import PERIOD, SAMPLES, Settings, medians, pressure
 from valve_friction_ros.identification import RefusalError, identify, published_estimate
 from valve_friction_ros.model import Recording, SensorNoise, Valve
