@@ -48,7 +48,7 @@ from valve_friction_ros.history import (
 )
 from valve_friction_ros.history.entry import settings_text
 from valve_friction_ros.identification import Verdict
-from valve_friction_ros.identification.trust.calibration import calibrated
+from valve_friction_ros.identification.trust.verdict import calibrated
 from valve_friction_ros.model import BENCH_VALVE, Drive, Recording
 
 

@@ -42,11 +42,12 @@ from valve_friction_ros.evidence.balance import (
 )
 from valve_friction_ros.evidence.moves import Move, Moves
 from valve_friction_ros.identification import TIMING_UNCERTAINTY, IdentificationSettings, Parameter
-from valve_friction_ros.identification.trust.calibration import calibrated, calibration_share
 from valve_friction_ros.identification.trust.uncertainty import MEDIAN_MAGNITUDE
 from valve_friction_ros.identification.trust.verdict import (
     WEAK_SHARE,
     Verdict,
+    calibrated,
+    calibration_share,
     fixed,
     not_identifiable,
     with_verdict,

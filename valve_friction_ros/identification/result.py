@@ -29,7 +29,6 @@ from valve_friction_ros.identification.published.estimate import Estimate
 from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.identification.settings import IdentificationSettings
 from valve_friction_ros.identification.signature.valve_signature import ValveSignature
-from valve_friction_ros.identification.trust.calibration import with_calibration
 from valve_friction_ros.identification.trust.misfit import Misfit
 from valve_friction_ros.identification.trust.model_comparison import (
     ModelComparison,
@@ -37,7 +36,7 @@ from valve_friction_ros.identification.trust.model_comparison import (
 )
 from valve_friction_ros.identification.trust.stated import CONTRADICTED, with_stated
 from valve_friction_ros.identification.trust.uncertainty import CORRELATION
-from valve_friction_ros.identification.trust.verdict import Parameter
+from valve_friction_ros.identification.trust.verdict import Parameter, with_calibration
 from valve_friction_ros.identification.units import SLIDING
 from valve_friction_ros.model.checks import frozen
 from valve_friction_ros.model.recording import Recording

@@ -26,11 +26,6 @@ from valve_friction_ros.identification import (
     Parameter,
     Verdict,
 )
-from valve_friction_ros.identification.trust.calibration import (
-    calibrated,
-    calibration_share,
-    with_calibration,
-)
 from valve_friction_ros.identification.trust.misfit import Misfit, stem_distance
 from valve_friction_ros.identification.trust.uncertainty import (
     block_covariance,
@@ -41,8 +36,11 @@ from valve_friction_ros.identification.trust.uncertainty import (
 )
 from valve_friction_ros.identification.trust.verdict import (
     FALL_SPEED,
+    calibrated,
+    calibration_share,
     fixed,
     not_identifiable,
+    with_calibration,
     with_verdict,
 )
 from valve_friction_ros.model import Drive, Valve

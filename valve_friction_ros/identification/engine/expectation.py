@@ -29,7 +29,7 @@ from valve_friction_ros.identification.engine.method import (
 )
 from valve_friction_ros.identification.engine.search import posteriors_at
 from valve_friction_ros.identification.settings import IdentificationSettings
-from valve_friction_ros.identification.trust.calibration import COVERAGE, calibration_share
+from valve_friction_ros.identification.trust.verdict import COVERAGE, calibration_share
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import KarnoppParameters, Valve
 from valve_friction_ros.signals import measured

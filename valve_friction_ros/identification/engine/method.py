@@ -71,7 +71,6 @@ from valve_friction_ros.identification.settings import (
     REGRESSED,
     IdentificationSettings,
 )
-from valve_friction_ros.identification.trust.calibration import BUDGET, COVERAGE
 from valve_friction_ros.identification.trust.excitation import (
     require_changing_drive,
     require_drive,
@@ -94,6 +93,8 @@ from valve_friction_ros.identification.trust.uncertainty import (
     correlation_of,
 )
 from valve_friction_ros.identification.trust.verdict import (
+    BUDGET,
+    COVERAGE,
     WEAK_SHARE,
     Parameter,
     Verdict,

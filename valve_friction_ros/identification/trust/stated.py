@@ -18,8 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from valve_friction_ros.identification.trust.calibration import OF_FORCE
-from valve_friction_ros.identification.trust.verdict import Parameter, Verdict
+from valve_friction_ros.identification.trust.verdict import OF_FORCE, Parameter, Verdict
 from valve_friction_ros.identification.units import PARAMETER_UNITS
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
