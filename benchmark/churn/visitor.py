@@ -28,9 +28,8 @@ from sensor_msgs.msg import FluidPressure, JointState
 from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 
-from benchmark.harness.participant import Participant
 from benchmark.harness.processes import node, parameters
-from benchmark.harness.run import Ledger
+from benchmark.harness.run import Ledger, Participant
 
 RATE = 250
 """Samples a second of each signal, Hz: visitors that listen cost more than the nodes."""

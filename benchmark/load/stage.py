@@ -22,8 +22,8 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from playwright.sync_api import Browser, BrowserContext, Error, Page, sync_playwright
 from rclpy.serialization import serialize_message
 
-from benchmark.harness.participant import Participant
 from benchmark.harness.processes import Process, free_port, module, parameters
+from benchmark.harness.run import Participant
 from benchmark.load.plant import identifier_of, ratio_of, tag_of
 from valve_friction_ros.health import (
     AlarmKind,

@@ -25,8 +25,7 @@ from benchmark.harness.rows import Row
 from benchmark.harness.run import Ledger, endured, run_parser
 from benchmark.soak.faults import FAULTS, Site, settled
 from benchmark.soak.feed import PERIOD, Feed, Piece
-from benchmark.soak.plant import SERVICES, Plant, Process
-from benchmark.soak.site import own_database, small_disk
+from benchmark.soak.plant import SERVICES, Plant, Process, own_database, small_disk
 from benchmark.soak.summary import database_rows, rows
 from valve_friction_ros.history import HistoryFile
 

@@ -18,8 +18,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from benchmark.soak.feed import Feed, Nonsense
-from benchmark.soak.plant import Life, Plant, Process
-from benchmark.soak.site import Database, filled
+from benchmark.soak.plant import Database, Life, Plant, Process, filled
 
 _PATIENCE = 60.0
 """Time, s, in which what was sent must be accounted for."""

@@ -16,7 +16,7 @@ from benchmark.harness.processes import CODES
 from benchmark.harness.rows import Row, none, some
 from benchmark.harness.run import Events, by_kind
 from benchmark.soak.feed import TOLD_WITHIN
-from benchmark.soak.site import Kept
+from benchmark.soak.plant import Kept
 
 _KILLED = "SIGKILL"
 _BUSY = "already running"

@@ -18,8 +18,8 @@ from rclpy.client import Client
 from rclpy.task import Future
 from std_srvs.srv import Trigger
 
-from benchmark.harness.participant import Participant
 from benchmark.harness.processes import Process, module, parameters
+from benchmark.harness.run import Participant
 
 PROFILE = "FASTRTPS_DEFAULT_PROFILES_FILE"
 _PATIENCE = 120.0

@@ -31,7 +31,7 @@ from benchmark.service.plants import PLANTS, Duty
 from benchmark.service.report import bounds_met, tables
 from benchmark.service.trial import Number, Told
 from benchmark.soak.feed import PIECE, Feed
-from benchmark.soak.site import Database, Kept
+from benchmark.soak.plant import Database, Kept
 from benchmark.soak.summary import database_rows
 from benchmark.soak.summary import rows as soak_rows
 from valve_friction_ros.history import HistoryFile, copied

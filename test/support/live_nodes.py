@@ -35,7 +35,7 @@ from sensor_msgs.msg import FluidPressure, JointState
 from std_msgs.msg import Float64, Float64MultiArray
 from std_srvs.srv import Trigger
 
-from benchmark.harness.participant import Participant
+from benchmark.harness.run import Participant
 
 PROJECT = Path(__file__).resolve().parents[2]
 NAMESPACE = "/fv_101"
