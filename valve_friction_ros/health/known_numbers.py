@@ -73,7 +73,7 @@ class KnownNumbers:
                 continue
             if stop in dated and _is_beyond(fresh[end], dated[stop].number, side):
                 del dated[stop]
-            if end in dated and not _is_farther(fresh[end], dated[end].number, side):
+            if end in dated and not side * (fresh[end].value - dated[end].value) >= 0:
                 del fresh[end]
         dated |= {n: DatedNumber(time, one.value, one.half_width) for n, one in fresh.items()}
         return KnownNumbers(dated, time)
@@ -119,7 +119,3 @@ class KnownNumbers:
 def _is_beyond(end: Measured, stop: Measured, side: float) -> bool:
     """Return whether the stem has surely gone beyond a stop."""
     return side * (end.value - stop.value) > end.half_width + stop.half_width
-
-
-def _is_farther(end: Measured, before: Measured, side: float) -> bool:
-    return side * (end.value - before.value) >= 0

@@ -94,6 +94,11 @@ class Named(NamedTuple):
     is_strong: bool = False
 
 
+def plain_name(text: str) -> str:
+    """Return the letters and digits of a name, whatever their case."""
+    return "".join(filter(str.isalnum, text.casefold()))
+
+
 def known_unit(text: str) -> str:
     """Return the unit that a text is, or nothing."""
     unit = unit_named(text)

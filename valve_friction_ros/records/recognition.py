@@ -24,7 +24,7 @@ from typing import Any
 
 from valve_friction_ros.records.columns import KNOWN_UNITS, Columns
 from valve_friction_ros.records.files import table_stem
-from valve_friction_ros.records.header_words import Named, named, number_and_unit
+from valve_friction_ros.records.header_words import Named, named, number_and_unit, plain_name
 from valve_friction_ros.records.layout import (
     OWN,
     Layout,
@@ -387,7 +387,7 @@ class _Recognition(Look):
         """Yield what a file holds of a valve; its name speaks for a column that says nothing."""
         own = table_stem(self.raw.path)
         of_name = named([own])
-        own = next((one for one in self.given if _plain(one) in _plain(own)), own)
+        own = next((one for one in self.given if plain_name(one) in plain_name(own)), own)
         by_name = []
         for name, said, place in candidates:
             if said.quantity in ("", "value") and name not in self.given:
@@ -457,10 +457,6 @@ class _Recognition(Look):
             self._ask_name(quantity, [name for name, _, _ in among])
             if among and not any(said_.unit for _, said_, _ in among):
                 self.questions[-1] += f", and its unit (--{quantity}-unit)"
-
-
-def _plain(name: str) -> str:
-    return "".join(filter(str.isalnum, name.casefold()))
 
 
 def _may_be_si(quantity: str, numbers: Sequence[float]) -> bool:

@@ -22,6 +22,7 @@ from valve_friction_ros.model.drive import Drive
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.records.bags.topics import TopicChoice, bag_libraries, is_bag
 from valve_friction_ros.records.columns import Columns
+from valve_friction_ros.records.header_words import plain_name
 from valve_friction_ros.records.recorded_valve import RecordedValve, Stretch
 from valve_friction_ros.records.table import OpenTables, ReadSignal, left_out, require_good
 from valve_friction_ros.records.table_rows import readable
@@ -172,7 +173,7 @@ def read_table(
     table.require_settled()
     valves = table.layout.valves
     if name is not None and len(valves) > 1:
-        chosen = {one: each for one, each in valves.items() if _plain(one) == _plain(name)}
+        chosen = {one: each for one, each in valves.items() if plain_name(one) == plain_name(name)}
         if not chosen:
             known = ", ".join(valves)
             raise ValueError(f"{path}: no valve is called {name!r}: choose one of {known}")
@@ -191,10 +192,6 @@ def read_table(
             one = RecordedValve(path, label, RefusalError(reason))
         found.append(one)
     return tuple(found)
-
-
-def _plain(text: str) -> str:
-    return "".join(filter(str.isalnum, text.casefold()))
 
 
 def _recorded(

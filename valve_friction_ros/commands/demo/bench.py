@@ -63,12 +63,10 @@ class BenchClient(Node):
 
     def _take(self) -> None:
         for taken in self._pressures.take():
-            self._on_pressure(taken.message)
+            message = taken.message
+            self._buffer.add_pressure(stamp_of(message.header.stamp), message.fluid_pressure)
         for taken in self._stems.take():
             self._on_stem(taken.message)
-
-    def _on_pressure(self, message: FluidPressure) -> None:
-        self._buffer.add_pressure(stamp_of(message.header.stamp), message.fluid_pressure)
 
     def _on_stem(self, message: JointState) -> None:
         stamp = stamp_of(message.header.stamp)
