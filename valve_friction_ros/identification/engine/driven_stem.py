@@ -206,21 +206,21 @@ def _tangent(
     """Differentiate what drives the stem by some coordinates, and where it begins."""
     tangent = no_tangent(coordinates.size, room[0], room[1])
     constants, shares = _constants(at, course.travel), _shares(course, at)
-    square, lagged = course.place * course.place, np.empty_like(course.force)
+    signals = np.empty((shares.shape[1], course.force.size))
+    lagged = signals[4]
     if at.force_lag >= 0.0:
         _lag_slope(course.force, at.force_lag, course.period, lagged)
     else:
         _lead_slope(course.force, course.period, lagged)
-    signals = (
-        np.ones_like(square),
-        square - 1.0 / 3.0,
-        course.place * (square - 0.6),
-        course.age,
-        lagged,
-        course.place,
-        course.age,
-        course.slowness,
-    )
+    for step in range(course.force.size):
+        place, age = course.place[step], course.age[step]
+        square = place * place
+        signals[0, step] = 1.0
+        signals[1, step] = square - 1.0 / 3.0
+        signals[2, step] = place * (square - 0.6)
+        signals[3, step] = signals[6, step] = age
+        signals[5, step] = place
+        signals[7, step] = course.slowness[step]
     for one, coordinate in enumerate(coordinates):
         row = constants[coordinate]
         tangent.mass[one], tangent.spring_constant[one] = row[0], row[1]
@@ -229,11 +229,11 @@ def _tangent(
         tangent.upward[one], tangent.downward[one] = row[5], row[6]
         tangent.stribeck_velocity[one] = row[8]
         tangent.of_friction[one] = 1.0 if coordinate in _OF_FRICTION else 0.0
-        for index, signal in enumerate(signals):
+        for index in range(signals.shape[0]):
             share = shares[coordinate, index]
             if share != 0.0:
-                for step in range(signal.size):
-                    tangent.signals[step, one] += share * signal[step]
+                for step in range(signals.shape[1]):
+                    tangent.signals[step, one] += share * signals[index, step]
     return tangent
 
 
@@ -255,7 +255,8 @@ def drive_stem(
     drift = at.drift * course.span
     viscous, dry = at.viscous_friction, at.coulomb_friction
     bent = at.spring_constant * at.presliding
-    force[:] = course.force
+    for step in range(force.size):
+        force[step] = course.force[step]
     if at.force_lag > _LEAST_LAG:
         _lag(force, at.force_lag, course.period)
     grip = np.empty_like(force)
@@ -341,56 +342,73 @@ def read_stem(
 def _bend(
     at: Place,
     force: NDArray[np.float64],
-    bends: NDArray[np.bool_],
+    coordinates: NDArray[np.int64],
     positions: NDArray[np.float64],
     velocities: NDArray[np.float64],
     tangent: Tangent,
 ) -> None:
     """Add the bend of the bristle to the positions and to their derivatives."""
-    found, bent = tangent.positions, np.flatnonzero(bends)
+    found = tangent.positions
     for step in range(force.size):
         held, share = _held(at, force[step], positions[step], velocities[step])
         if share > 0.0:
             share *= at.presliding
-            for one in range(bends.size):
+            for one in range(coordinates.size):
                 pull = (1.0 - tangent.of_friction[one]) * tangent.signals[step, one]
                 pull -= tangent.spring_constant[one] * positions[step]
                 pull -= at.spring_constant * found[step, one]
                 full = tangent.coulomb_friction[one] + tangent.slip_force[one]
                 found[step, one] += share * (pull - held * full)
-        for one in bent:
-            found[step, one] += held
+        for one in range(coordinates.size):
+            if coordinates[one] == _PRESLIDING:
+                found[step, one] += held
         positions[step] += at.presliding * held
 
 
 @compiled
+def _mixed(turned: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Return which columns have several parts."""
+    found = np.empty(turned.shape[1], dtype=np.bool_)
+    for one in range(found.size):
+        parts = 0
+        for other in range(turned.shape[0]):
+            parts += turned[other, one] != 0.0
+        found[one] = parts > 1
+    return found
+
+
+@compiled
 def _read_cells(
-    places: NDArray[np.float64],
+    cells: NDArray[np.float64],
+    shift: float,
     found: NDArray[np.float64],
-    by_delay: NDArray[np.float64],
+    coordinates: NDArray[np.int64],
     late: NDArray[np.float64],
     turned: NDArray[np.float64],
     slopes: NDArray[np.float64],
 ) -> None:
     """Interpolate derivatives at places between the steps, and turn them to other coordinates."""
-    own, read = np.diag(turned), np.empty(by_delay.size)
-    mixed = np.flatnonzero((turned != 0.0).sum(axis=0) > 1)
-    for cell in range(places.size):
-        step = min(max(math.floor(places[cell]), 0), late.size - 1)
-        share = min(places[cell] - step, 1.0)
+    size = coordinates.size
+    read, is_mixed = np.empty(size), _mixed(turned)
+    for cell in range(cells.size):
+        place = cells[cell] - shift
+        step = min(max(math.floor(place), 0), late.size - 1)
+        share = min(place - step, 1.0)
         slope = late[step] if share < 1.0 else 0.0
         if share < _AT_STEP and step > 0:
             slope = 0.5 * (late[step - 1] + late[step])
         elif 1.0 - _AT_STEP < share < 1.0 and step + 1 < late.size:
             slope = 0.5 * (late[step] + late[step + 1])
-        for one in range(by_delay.size):
+        for one in range(size):
             read[one] = found[step, one] + share * (found[step + 1, one] - found[step, one])
-            read[one] += by_delay[one] * slope
-            slopes[cell, one] = own[one] * read[one]
-        for one in mixed:
-            slopes[cell, one] = 0.0
-            for other in range(by_delay.size):
-                slopes[cell, one] += turned[other, one] * read[other]
+            if coordinates[one] == _DELAY:
+                read[one] += slope
+            slopes[cell, one] = turned[one, one] * read[one]
+        for one in range(size):
+            if is_mixed[one]:
+                slopes[cell, one] = 0.0
+                for other in range(size):
+                    slopes[cell, one] += turned[other, one] * read[other]
 
 
 @compiled
@@ -426,23 +444,23 @@ def read_slopes(
     positions, velocities = np.empty_like(force), np.empty_like(force)
     tangent = _tangent(course, at, coordinates, room)
     drive_stem(course, at, force, positions, velocities, tangent)
-    if at.presliding != 0.0 or (coordinates == _PRESLIDING).any():
-        _bend(at, force, coordinates == _PRESLIDING, positions, velocities, tangent)
+    bends = at.presliding != 0.0
+    for coordinate in coordinates:
+        bends = bends or coordinate == _PRESLIDING
+    if bends:
+        _bend(at, force, coordinates, positions, velocities, tangent)
     slow = np.zeros_like(force)
     _lag_slope(positions, at.stem_lag, course.period, slow)
     if at.stem_lag > _LEAST_LAG:
         for one in range(coordinates.size):
             _lag(tangent.positions[:, one], at.stem_lag, course.period)
         _lag(positions, at.stem_lag, course.period)
-    late = (positions[:-1] - positions[1:]) / course.period
+    late = np.empty(positions.size - 1)
+    for step in range(late.size):
+        late[step] = (positions[step] - positions[step + 1]) / course.period
     for one, coordinate in enumerate(coordinates):
         if coordinate == _STEM_LAG:
-            tangent.positions[:, one] = slow
-    _read_cells(
-        cells - at.delay / course.period,
-        tangent.positions,
-        np.where(coordinates == _DELAY, 1.0, 0.0),
-        late,
-        turned,
-        slopes,
-    )
+            for step in range(slow.size):
+                tangent.positions[step, one] = slow[step]
+    shift = at.delay / course.period
+    _read_cells(cells, shift, tangent.positions, coordinates, late, turned, slopes)

@@ -428,7 +428,7 @@ def curve_numbers(curves: Sequence[FrictionCurve]) -> dict[str, Estimated]:
     least = _LEAST_HALF_WIDTH if has_spring else _LEAST_OF_MACHINE
     if len(curves) < _CONFIRMED:
         least = _LEAST_ALONE
-    for name in {name for curve in curves for name in curve.numbers}:
+    for name in dict.fromkeys(name for curve in curves for name in curve.numbers):
         known = [curve.numbers[name] for curve in curves if name in curve.numbers]
         least_width = min(one.half_width for one in known)
         best = next(one for one in known if one.half_width <= _AS_WELL * least_width)

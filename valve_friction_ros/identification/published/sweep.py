@@ -172,9 +172,11 @@ def factors_above(
             _take_in(work, rows, taken, last)
             taken = last
         counts[step] = taken
-        if step < steps - 1:
-            sums[step] += sums[step + 1]
-        factors[step] = work[:, :columns].T
+        for row in range(columns):
+            if step < steps - 1:
+                sums[step, row] += sums[step + 1, row]
+            for column in range(columns):
+                factors[step, row, column] = work[column, row]
     return factors, sums, counts
 
 
