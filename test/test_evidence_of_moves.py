@@ -260,7 +260,7 @@ def test_a_turn_without_a_rest_makes_two_moves():
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"end": 0}, "must end after its begin"),
+        ({"end": 0}, "must end after it begins"),
         ({"stop": 1e-3}, "distance"),
         ({"force": math.nan}, "force"),
         ({"speed": -1.0}, "speed"),
@@ -303,7 +303,7 @@ def test_what_is_believed(begin, last, now):
 
 
 def test_back():
-    assert problem(START - SECOND) == "before those that are kept"
+    assert problem(START - SECOND) == "earlier than those stored"
     assert "before" in problem(0)
 
 
@@ -405,7 +405,7 @@ class TestEstimate:
         assert math.isnan(one.value)
         assert one.verdict is Verdict.NOT_IDENTIFIABLE
         assert "moves up and" in one.reason
-        assert "let the valve work on" in one.reason
+        assert "leave the valve in service" in one.reason
         assert not found.is_known
 
     def test_none_at_all(self):

@@ -229,7 +229,7 @@ def test_it_goes_from_a_recording_to_a_decision(monkeypatch, capsys):
     printed = capsys.readouterr().out
     assert "friction has grown" in printed
     assert "dead band 13.7 % of the travel" in printed
-    assert "the record very strongly favours the first model: it is 1e" in printed
+    assert "the record very strongly favours the first model, which is 1e" in printed
     low, high, middle = (names[name] for name in ("low", "high", "middle"))
     assert np.all(low <= high)
     assert np.mean((low <= middle) & (middle <= high)) > 0.9

@@ -147,8 +147,8 @@ def test_what_is_not_identifiable_has_no_number(with_friction):
 
 def test_an_impossible_friction_names_the_signals(with_friction):
     assert diagnosis_sentence(with_friction(-20.0, baseline=BASELINE)) == (
-        "The identified friction is -20 N, and friction is above zero: check the direction of both "
-        "signals and identify it again."
+        "The identified friction is -20 N, but friction cannot be negative: check the direction "
+        "of both signals and identify it again."
     )
 
 
@@ -263,8 +263,8 @@ def test_the_limits_of_a_packing(identified):
         ("travel_limit [m]", "3", "60", "5 %", "1970-02-10"),
         ("reversal_limit [reversals]", "200", "1200", "17 %", "1970-01-13"),
     )
-    assert warning.text.startswith("Packing life: 200 reversals of 1200 (reversal_limit), expected")
-    assert "renew the packing, then call ~/reset_usage" in warning.text
+    assert warning.text.startswith("Packing life: 200 of 1200 reversals (reversal_limit), expected")
+    assert "replace the packing, then call ~/reset_usage" in warning.text
     reached = limit_states(usage.since_renewal, None, UsageLimits(3.0, 1e6), 2 * day)
     _, table, *_ = blocks(reached)
     assert [row[-1] for row in table.rows] == ["reached", "not known before a day of watching"]
@@ -303,15 +303,15 @@ class TestUncertaintyBudget:
         ).blocks
         assert [column.title for column in table.columns] == [
             "standard uncertainty",
-            "by the record",
-            "by the timing",
-            "by the calibration",
+            "from record",
+            "from timing",
+            "from calibration",
         ]
         assert table.rows == (
             ("Coulomb friction F_c [N]", "17", "0.72", "0"),
             ("spring constant k [N/m]", "1382", "0", "0"),
         )
-        assert words.text.startswith("Where the intervals come from.")
+        assert words.text.startswith("Sources of the interval widths.")
 
     def test_the_parts_add_up_to_the_interval(self, with_friction):
         """Half a width of 10 is 5, of which 3 leave 4; k has nothing left."""
@@ -324,11 +324,11 @@ class TestUncertaintyBudget:
         (table, words) = section(
             identification_report(dataclasses.replace(record, result=result)), "Uncertainty budget"
         ).blocks
-        assert table.columns[-1].title == "by other models"
+        assert table.columns[-1].title == "from other models"
         told = {row[0]: [float(cell) for cell in row[1:]] for row in table.rows}
         assert told["Coulomb friction F_c [N]"] == [2.4, 1.8, 0.0, 4.0]
         assert told["spring constant k [N/m]"] == [0.5, 0.0, 0.0, 0.0]
-        assert "By other models" in words.text
+        assert "From other models" in words.text
 
     def test_its_sources_are_those_of_the_method(self, with_budget):
         told = rows(with_budget({"coulomb_friction": {"weather": 2.0}}), "Uncertainty budget")
@@ -418,7 +418,7 @@ def test_stated_values_that_the_record_contradicts(identified):
     result = dataclasses.replace(identified.result, settings=settings)
     record = dataclasses.replace(identified, result=result)
     note, *_ = [block.text for block in section(identification_report(record), "Notes").blocks]
-    assert note.startswith(f"spring_constant is {found:.6g} N/m by the record and ")
+    assert note.startswith(f"spring_constant is {found:.6g} N/m from the record but stated as ")
     told = rows(record, "Settings and versions")
     assert told["stated values, compared with those found"] == (
         f"spring_constant = {round(found / 3):g}",

@@ -162,7 +162,7 @@ def test_deviation_in_time():
     findings = response_findings(monitor.summary, ResponseLimits(deviation=0.01), None)
     (finding,) = findings
     assert finding.level is Level.WARN
-    assert "rests 2 %" in finding.message or "rests 2.0 %" in finding.message
+    assert "settles 2 %" in finding.message or "settles 2.0 %" in finding.message
     assert "calibration" in finding.message
     assert response_findings(monitor.summary, ResponseLimits(), None) == []
 
@@ -235,7 +235,7 @@ def test_a_stem_that_swings_with_its_pressure_is_not_called_sticky():
     assert monitor.hunting is not None
     assert not monitor.hunting.sticks
     (finding,) = response_findings(monitor.summary, ResponseLimits(), monitor.hunting)
-    assert "nothing shows that friction is the cause" in finding.message
+    assert "no sign that friction is the cause" in finding.message
 
 
 def test_a_swing_that_has_died_away_is_no_hunting():
@@ -343,12 +343,12 @@ def messages(moves, limits=NO_LIMITS, dead_band=np.nan):
 
 def test_the_causes_that_the_pressure_leaves():
     (seized,) = messages(SEIZED)
-    assert "ignored 5 of the latest 5 steps of its command of 5 %" in seized
-    assert "the pressure responds: the stem is stuck, or its position sensor" in seized
+    assert "ignored 5 of the latest 5 command steps of 5 %" in seized
+    assert "the pressure responds: the stem is stuck or its position sensor" in seized
     (starved,) = messages(STARVED)
-    assert "does not reach the actuator" in starved
+    assert "the actuator pressure does not respond either" in starved
     (mixed,) = messages([*SEIZED[:3], *STARVED[:2]])
-    assert "is stuck, its position sensor has stopped, or the pressure" in mixed
+    assert "is stuck, its position sensor has failed, or the pressure" in mixed
     assert messages(HEALTHY) == []
 
 
@@ -394,7 +394,7 @@ def test_a_stem_on_its_seat_may_ignore_a_few_percent():
 def test_what_is_ignored_is_late():
     """Two quick answers of ten hid that the stem stood for as long as it was asked."""
     told = messages([*HEALTHY[:2], *SEIZED[:8]], ResponseLimits(dead_time=1.0))
-    (late,) = (one for one in told if "begins to move" in one)
+    (late,) = (one for one in told if "starts to move" in one)
     assert "of 10 moves" in late
     held_for = np.median([m.held for m in SEIZED[:8]])
     assert f"{held_for:.2g} s after" in late
@@ -404,7 +404,7 @@ def test_what_is_ignored_is_late():
 def test_a_positioner_is_not_blamed_for_a_stem_that_stands(moves):
     assert summarised(moves).cause("deviation") is AnswerCause.UNKNOWN
     told = messages(moves, ResponseLimits(deviation=0.01))
-    assert any("rests" in one for one in told)
+    assert any("settles" in one for one in told)
     assert not any("calibration" in one for one in told)
 
 

@@ -377,8 +377,8 @@ class TestLimits:
         assert state.expected == NOW + 25 * DAY
         assert state.warns
         assert state.message == (
-            "packing life: 100 m of travel of 150 (travel_limit), expected on 2024-10-29: renew "
-            "the packing, then call ~/reset_usage"
+            "packing life: 100 m of 150 m travelled (travel_limit), expected on 2024-10-29: "
+            "replace the packing, then call ~/reset_usage"
         )
 
     def test_no_warning_a_month_before(self):
@@ -391,7 +391,7 @@ class TestLimits:
         assert state.is_reached
         assert state.warns
         assert state.expected is None
-        assert "10 reversals of 10 (reversal_limit): reached: renew" in state.message
+        assert "10 of 10 reversals (reversal_limit): reached: replace" in state.message
 
     @pytest.mark.parametrize("pace", [None, Pace(0.0, 0.0), Pace(1e-9, 0.0)])
     def test_no_date(self, pace):
@@ -408,8 +408,8 @@ class TestLimits:
         near = self.state(UsageLimits(travel=110.0), pace=None)._replace(has_warned=True)
         assert near.warns
         assert near.message == (
-            "packing life: 100 m of travel of 110 (travel_limit), near its limit (warned before): "
-            "renew the packing, then call ~/reset_usage"
+            "packing life: 100 m of 110 m travelled (travel_limit), close to its limit "
+            "(previously warned): replace the packing, then call ~/reset_usage"
         )
 
     def test_what_has_warned_is_found_again(self):

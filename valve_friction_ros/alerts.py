@@ -164,23 +164,23 @@ class Webhook:
         another machine, or holds a name or a password.
         """
         if not url.isascii() or not url.isprintable() or " " in url:
-            raise ValueError(f"{name} has a space, or a character that is not ASCII: encode it")
+            raise ValueError(f"{name} contains a space or a non-ASCII character: encode it")
         try:
             parts = urlsplit(url)
             host, port = parts.hostname, parts.port
         except ValueError:
             host = port = None
         if not host or parts.scheme not in _PORTS:
-            raise ValueError(f"{name} is no address: write https://host/path")
+            raise ValueError(f"{name} is not an address: write https://host/path")
         if parts.username is not None or parts.password is not None:
             raise ValueError(
-                f"{name} holds a name or a password, which everybody on the ROS graph can "
-                f"read: put a token into the environment variable {_TOKEN}"
+                f"{name} holds a name or a password, which everyone on the ROS graph can read: "
+                f"put a token into the environment variable {_TOKEN}"
             )
         if parts.scheme == "http" and not is_loopback(host):
             raise ValueError(
-                f"{name} is http to another machine, where everybody on the way can read and "
-                "change it: write https, or name a relay on this machine"
+                f"{name} uses http to another machine, where anyone on the path can read and "
+                "change it: use https, or a relay on this machine"
             )
         target = (parts.path or "/") + (f"?{parts.query}" if parts.query else "")
         return cls(parts.scheme, host, _PORTS[parts.scheme] if port is None else port, target)
@@ -235,7 +235,7 @@ class Secrets:
         """
         secret, token = (environment.get(name, "").strip() for name in (_SECRET, _TOKEN))
         if not token.isascii() or (token and not token.isprintable()) or " " in token:
-            raise ValueError(f"{_TOKEN} has a space, or a character that is not ASCII: correct it")
+            raise ValueError(f"{_TOKEN} contains a space or a non-ASCII character: correct it")
         return cls(secret, token)
 
     def going_to(self, webhook: Webhook, environment: Mapping[str, str] = os.environ) -> "Secrets":
@@ -389,7 +389,7 @@ def post(webhook: Webhook, body: bytes, secrets: Secrets, limit: float = 10.0) -
                 raise _delivery_error(webhook, error, connection.is_late, limit) from None
     except ValueError:  # the port of a proxy
         raise DeliveryError(
-            "the proxy of the environment is no address: correct it", True
+            "the proxy set in the environment is not an address: correct it", True
         ) from None
     if not 200 <= status < 300:
         is_redirect = 300 <= status < 400
@@ -404,17 +404,17 @@ def _delivery_error(
     webhook: Webhook, error: Exception, is_late: bool, limit: float
 ) -> DeliveryError:
     if is_late or isinstance(error, TimeoutError):
-        return DeliveryError(f"{webhook} has not answered within {limit:g} s", is_answered=False)
+        return DeliveryError(f"{webhook} did not answer within {limit:g} s", is_answered=False)
     if isinstance(error, ssl.SSLCertVerificationError):
         return DeliveryError(
             f"the certificate of {webhook} is not trusted: {error.verify_message}: correct the "
-            "server, or name its authority's file in SSL_CERT_FILE",
+            "server, or set SSL_CERT_FILE to the file of its certificate authority",
             is_final=True,
         )
     if isinstance(error, OSError):
         cause = error.strerror or type(error).__name__
         return DeliveryError(f"{webhook}: {cause}", is_answered=False)
-    return DeliveryError(f"{webhook} answered no HTTP ({type(error).__name__})")
+    return DeliveryError(f"{webhook} did not answer with HTTP ({type(error).__name__})")
 
 
 _LONGEST_WAIT = 300.0
@@ -499,7 +499,9 @@ class Outbox:
             self._letters.append(_QueuedLetter(letter))
             if len(self._letters) > _MOST_WAITING:
                 oldest = 1 if self._is_sending else 0
-                self._give_up(self._letters[oldest], f"more than {_MOST_WAITING} wait")
+                self._give_up(
+                    self._letters[oldest], f"more than {_MOST_WAITING} alerts are waiting"
+                )
                 del self._letters[oldest]
             self._wake()
 

@@ -298,11 +298,11 @@ def misfit_words(misfit: float, unit: str) -> str:
 
 
 _ABORTS = {
-    "POSITION": "the stem was at {0:.4g} m, beyond its limit of {1:.4g} m",
+    "POSITION": "the stem reached {0:.4g} m, beyond its limit of {1:.4g} m",
     "PRESSURE": "the measured pressure was {0:.6g} Pa, beyond its limit of {1:.6g} Pa",
-    "SILENT_STEM": "no stem position arrived for {0}, and {1:g} s are allowed",
-    "SILENT_PRESSURE": "no pressure arrived for {0}, and {1:g} s are allowed",
-    "HELD_UP": "the player stood still for {0:.2g} s ({1:g} s are allowed)",
+    "SILENT_STEM": "no stem position was received for {0} (limit {1:g} s)",
+    "SILENT_PRESSURE": "no pressure was received for {0} (limit {1:g} s)",
+    "HELD_UP": "the player stalled for {0:.2g} s (limit {1:g} s)",
     "ASKED": "an operator stopped it",
     "SHUTDOWN": "the player was shut down",
 }
@@ -334,33 +334,33 @@ def evidence_ratio_words(
     digits = abs(log_ratio) / math.log(10.0)
     ratio = f"1e{digits:.0f}" if digits >= 4 else f"{10.0**digits:.2g}"
     which = "first" if log_ratio > 0 else "second"
-    told = "the record hardly distinguishes the two models"
+    told = "the record cannot distinguish between the two models"
     if support != "HARDLY":
         told = (
-            f"the record {_SUPPORTS[support]} favours the {which} model: it is {ratio} times as "
-            "probable"
+            f"the record {_SUPPORTS[support]} favours the {which} model, which is {ratio} times "
+            "as probable"
         )
     count = f"{samples:.0f} samples"
     if independent < 0.5 * samples:
-        count += f" carry the information of {independent:.0f} independent ones"
+        count += f" (equivalent to {independent:.0f} independent samples)"
     wrong = {
-        (False, False): "; neither describes the valve to within noise, so this says which is "
-        "nearer, not which is true",
-        (True, False): "; the second does not describe the valve to within noise",
-        (False, True): "; the first does not describe the valve to within noise",
+        (False, False): "; neither model describes the valve to within noise: this ranks them, it "
+        "does not confirm either",
+        (True, False): "; the second model does not describe the valve to within noise",
+        (False, True): "; the first model does not describe the valve to within noise",
     }.get(describes, "")
     return f"{told}; {count}{wrong}"
 
 
 _LACKS = {
-    "RESULT": "its identifier has produced no result since it started",
+    "RESULT": "its identifier has not produced a result since it started",
     "VALUE": "{of} is not identifiable",
-    "SIZE": "{of} is not above zero",
+    "SIZE": "{of} is not positive",
     "INTERVAL": "{of} has no interval",
-    "PRECISION": "{of} is known to ±{share}, and a baseline needs ±{largest}",
-    "HEALTH": "the valve is in alarm, which a new baseline could hide",
+    "PRECISION": "{of} is known to ±{share}, but a baseline requires ±{largest}",
+    "HEALTH": "the valve is in alarm, and a new baseline could hide the cause",
 }
-_LACKS_OF_MOVES = "friction by the moves in service"
+_LACKS_OF_MOVES = "friction from moves in service"
 
 
 def lack_words(of: str, lack: str, share: float, largest: float) -> str:
@@ -372,21 +372,21 @@ def lack_words(of: str, lack: str, share: float, largest: float) -> str:
 
 
 _BETTER_RECORD = (
-    "Identify a record with more strokes, some fast and some slow.",
+    "Record more strokes, some fast and some slow, and identify again.",
     "Plan a stroke test that determines friction well enough: valve_friction plan-test.",
 )
 _LACK_REMEDIES = {
     "RESULT": ("Identify the valve.",),
     "VALUE": _BETTER_RECORD,
     "SIZE": ("Check the direction of both signals, then identify again.",),
-    "INTERVAL": ("Identify by a method that gives intervals.",),
+    "INTERVAL": ("Use a method that gives confidence intervals.",),
     "PRECISION": _BETTER_RECORD,
     "HEALTH": (
         "Repair the valve, then identify it again.",
         "If it is healthy, set baseline_in_alarm of its identifier to true.",
     ),
 }
-_LET_IT_WORK = "Or leave the valve in service: in time its moves will provide a baseline."
+_LET_IT_WORK = "Or leave the valve in service: its moves will provide a baseline in time."
 
 
 def lack_remedies(lacks: Sequence[tuple[str, str]]) -> tuple[str, ...]:
@@ -405,7 +405,7 @@ def _ago(age: int) -> str:
     """Write an age, ns, in whole units; a clock that has gone back since is named."""
     seconds = age / 1e9
     if seconds < 0:
-        return "in the future: a clock has been set back since"
+        return "in the future: a clock has since been set back"
     units = (("days", 86400), ("h", 3600), ("min", 60))
     unit, length = next((one for one in units if seconds >= 2 * one[1]), ("s", 1))
     return f"{seconds // length:.0f} {unit} ago"
@@ -519,50 +519,53 @@ _TABLES: dict[str, Mapping[str, str]] = {
         "BACK": "back, ",
     },
     "rejected": {
-        "DAMAGED": "they are damaged messages: check the publisher",
-        "NOT_FINITE": "not finite: check sensor, cable and driver",
-        "REPEATED": "they repeat a stamp: give each sample the time at which it was measured",
-        "OVERTAKEN": "they arrive out of order: look at the network between them",
-        "BACK": "their stamps go back: check for a second publisher, and the clock of the sensor",
+        "DAMAGED": "the messages are damaged: check the publisher",
+        "NOT_FINITE": "the values are not finite: check sensor, cable and driver",
+        "REPEATED": "time stamps are repeated: stamp each sample with the time of its measurement",
+        "OVERTAKEN": "samples arrive out of order: check the network",
+        "BACK": "time stamps go backwards: check for a second publisher, and check the sensor "
+        "clock",
     },
     "survey": {
         "UNKNOWN": "",
-        "GOOD": ": good, by the limits of the first survey",
-        "WATCH": ": watch it, by the limits of the first survey",
-        "BAD": ": bad, by the limits of the first survey",
+        "GOOD": ": good by the limits for a first survey",
+        "WATCH": ": watch, by the limits for a first survey",
+        "BAD": ": bad by the limits for a first survey",
     },
     "end": {"lower_stop": "lower end", "upper_stop": "upper end"},
     "sensor": {"BOTH": "zero and span", "EITHER": "zero or span", "SPAN": "span"},
     "signal": {**{one.name: one.words for one in Drive}, "STEM": "stem position"},
     "stops": {
         "NONE": "",
-        "ONE": ", with which the move of the one stop that was met agrees",
-        "BOTH": ", as both travel stops have moved alike",
+        "ONE": ", consistent with the shift of the one travel stop reached",
+        "BOTH": ", consistent with the shift of both travel stops",
     },
     "cause": {
-        "FRICTION": "the pressure responds and friction holds the stem: check packing and guide",
-        "LATE": "the pressure itself responds late: check the positioner",
-        "SLOW": "the pressure itself is slow: check positioner, air supply and volume",
-        "SETTING": "the stem follows its pressure, which stops short: check calibration and gain "
-        "of the positioner, and the air supply",
-        "UNKNOWN": "pressure and stem do not show whether the positioner or the valve is to blame",
-        "PRESSURE_ANSWERS": "the pressure responds: the stem is stuck, or its position sensor has "
-        "stopped: look at the stem",
-        "PRESSURE_SILENT": "the pressure does not respond either: it does not reach the actuator: "
-        "check the positioner, its command and the air supply",
+        "FRICTION": "the pressure responds but friction holds the stem: check packing and guide",
+        "LATE": "the actuator pressure itself responds late: check the positioner",
+        "SLOW": "the actuator pressure itself changes slowly: check positioner, air supply and "
+        "volume",
+        "SETTING": "the stem follows the pressure, but the pressure stops short: check "
+        "calibration and gain of the positioner, and the air supply",
+        "UNKNOWN": "pressure and stem do not show whether the positioner or the valve is the cause",
+        "PRESSURE_ANSWERS": "the pressure responds: the stem is stuck or its position sensor has "
+        "failed; inspect the stem",
+        "PRESSURE_SILENT": "the actuator pressure does not respond either: check the positioner, "
+        "its command and the air supply",
         "PRESSURE_ANSWERS_SOME": "the pressure responds to some of them: the stem is stuck, its "
-        "position sensor has stopped, or the pressure does not always reach the actuator",
-        "STICTION": "it sticks and jumps while the pressure swings: stiction, and integral action: "
-        "check the packing first",
-        "NOT_FRICTION": "nothing shows that friction is the cause: check gain and air supply of "
-        "the positioner",
+        "position sensor has failed, or the pressure does not always "
+        "reach the actuator",
+        "STICTION": "the stem sticks and jumps while the pressure swings (stiction with integral "
+        "action): check the packing first",
+        "NOT_FRICTION": "no sign that friction is the cause: check gain and air supply of the "
+        "positioner",
     },
 }
 """Words for the members of enums and for names, by table."""
 
 _MORE_STROKES = (
-    "record more strokes, some fast and some slow, and state a timing_uncertainty if the clocks "
-    "and lags of both signals are known"
+    "record more strokes, some fast and some slow, and set timing_uncertainty if the clocks and "
+    "lags of both signals are known"
 )
 _SLIDING_SIZE = "{value,half_width:±} N at {speed:in .3g mm/s} mm/s"
 _HEALTHY = "call ~/set_baseline while it is healthy"
@@ -573,162 +576,169 @@ _SENTENCES = {
     Code.COMPARED: "{state:of state}: {what} is {ratio:figures} times {healthy}; {effect}",
     Code.COMPARED_AGAIN: "{state:of state}: {what} is {ratio:figures} times {healthy}; {effect}; "
     "identify it again from a longer record with more strokes to be sure",
-    Code.FRICTION_BELOW_ZERO: "{of:words} is {value,half_width:±} N, and friction is "
-    "above zero: check the direction of both signals",
-    Code.MOVES_BELOW_ZERO: "{moves}, sliding friction is {value:.4g} N, and friction is above "
-    "zero: check the direction of both signals",
+    Code.FRICTION_BELOW_ZERO: "{of:words} is {value,half_width:±} N, but friction cannot be "
+    "negative: check the direction of both signals",
+    Code.MOVES_BELOW_ZERO: "{moves}, sliding friction is {value:.4g} N, but friction cannot be "
+    "negative: check the direction of both signals",
     Code.VANISHED: "friction collapsed, the packing may leak: {of:words} is too small to be "
-    "identified, at most {largest:.2g} N; its baseline is {healthy:.4g} N",
+    "identified (at most {largest:.2g} N); its baseline is {healthy:.4g} N",
     Code.NOT_IDENTIFIABLE: "{of:words} is not identifiable: {reason}",
     Code.NO_BASELINE: "no baseline yet; {effect}{survey:of survey}",
     Code.NOT_COMPARED: "no comparison with the baseline ({baseline}): {reasons:list |; |}; "
     "{effect}",
-    Code.NOT_COMPARED_SPEED: "the stem slides at {speed:in .2g mm/s} mm/s, and at "
-    "{healthy:in .2g mm/s} mm/s in the baseline, with too little known of the friction between: "
-    "move it as in the baseline",
+    Code.NOT_COMPARED_SPEED: "the stem slid at {speed:in .2g mm/s} mm/s, but at {healthy:in .2g "
+    "mm/s} mm/s in the baseline, and friction between these speeds is "
+    "not known well enough: move the stem as for the baseline",
     Code.NOT_COMPARED_LACKING: "the baseline has no {of:words}: set it again",
     Code.WAS_COMPARED: "{what} was {ratio:figures} times its baseline{time:dated}",
-    Code.MISFIT: "the Karnopp model does not describe this valve ({misfit:misfit} of misfit)",
+    Code.MISFIT: "the Karnopp model does not describe this valve (misfit {misfit:misfit})",
     Code.DOUBTED: "{doubt}; {of}",
-    Code.SCALED: "friction and spring constant have changed by one factor, which points to "
-    "{scale}: check both before any work on the packing; {of}",
+    Code.SCALED: "friction and spring constant have changed by the same factor, which points to "
+    "{scale}: check both before working on the packing; {of}",
     Code.DATED: "{of}{time:dated}",
     Code.DATED_EARLIER: "{of} (identified earlier, {time:minute})",
     Code.AGED: "{of} (identified {age:ago}, before the restart)",
     Code.STANDS_UNCOMPARED: "{alarm}; the latest record cannot be compared: {latest}",
     Code.STANDS_UNCERTAIN: "{alarm}; the latest record does not clear it: {latest}",
-    Code.FAILED: "{error}; before: {of}",
+    Code.FAILED: "{error}; previous result: {of}",
     Code.NO_ESTIMATE: "no estimate: {reason}",
     Code.NOTHING_IDENTIFIED: "nothing has been identified yet",
-    Code.REFUSED: "the latest identification was refused: {reason}; before: {of}",
+    Code.REFUSED: "the latest identification was refused: {reason}; previous result: {of}",
     Code.REFUSED_REPEATEDLY: "the latest {count} identifications were refused: {reason}",
-    Code.MEASURED_EARLIER: "{of} (measured {time:minute}; no record since shows it)",
+    Code.MEASURED_EARLIER: "{of} (measured {time:minute}; not seen in any record since)",
     Code.FRICTION: "{of:words}",
     Code.FRICTION_AT: "{of:words} at {speed:in .2g mm/s} mm/s",
     Code.FRICTION_SIZE: "{of:words} {value,half_width:±} N",
     Code.DEAD_BAND: "the stem ignores reversals smaller than {share:percent} of its travel",
     Code.ITS_BASELINE: "its baseline",
-    Code.FIRST_MOVES: "what it was until {time:minute}, when the moves of this valve were first "
-    "combined ({has_baseline:?the baseline cannot be compared|no baseline}: " + _HEALTHY + ")",
-    Code.BEFORE_CHANGE: "what it was before it changed, between {earliest:minute} and "
-    "{latest:minute} (no baseline and no first moves to compare with: " + _HEALTHY + ")",
+    Code.FIRST_MOVES: "its value up to {time:minute}, when the moves of this valve were first "
+    "combined ({has_baseline:?the baseline cannot be compared|no "
+    "baseline}: " + _HEALTHY + ")",
+    Code.BEFORE_CHANGE: "its value before the change between {earliest:minute} and "
+    "{latest:minute} (no baseline and no earlier moves to compare "
+    "with: " + _HEALTHY + ")",
     Code.DEAD_BAND_INTERVAL: "; the stem ignores reversals smaller than "
     "{share,half_width:shares} % of its travel",
     Code.BASELINE: "{frictions:list |, |}",
     Code.BASELINE_COULOMB: "coulomb friction {value,half_width:±} N",
     Code.BASELINE_SLIDING: f"sliding friction {_SLIDING_SIZE}",
     Code.SLIDING_SIZE: _SLIDING_SIZE,
-    Code.BASELINE_REMARK: "it is known to ±{share:percent}: only friction that has grown to "
-    "{least:.2g} times is certain to be declared; " + _MORE_STROKES,
-    Code.BY_MOVES: "by {moves} moves in service since {since:minute}{dead_band}",
-    Code.CHANGED: "{of}; it changed between {earliest:minute} and {latest:minute}",
+    Code.BASELINE_REMARK: "it is known to ±{share:percent}: only growth to {least:.2g} times or "
+    "more is certain to be reported; " + _MORE_STROKES,
+    Code.BY_MOVES: "from {moves} moves in service since {since:minute}{dead_band}",
+    Code.CHANGED: "{of}; the change occurred between {earliest:minute} and {latest:minute}",
     Code.AREA_AND_SCALE: "the scale of the {drive:drive} sensor and the diaphragm area",
     Code.SCALE: "the scale of the {drive:drive} sensor",
-    Code.POSITION_SCALE: "the position sensor's scale",
+    Code.POSITION_SCALE: "the scale of the position sensor",
     Code.UNTIL_BEFORE: "{of} (until {time:second}, before that identification)",
-    Code.BASELINE_WITHOUT_SLIDING: "not compared with the baseline, which has no sliding "
-    "friction, and moves in service determine no other: " + _SET_BASELINE,
-    Code.BASELINE_AT_OTHER_SPEED: "not compared with the baseline, which belongs to "
-    "{healthy:in .2g mm/s} mm/s, and the moves to {speed:in .2g mm/s} mm/s, beyond a factor of "
-    "{factor:g}: " + _SET_BASELINE,
-    Code.COMMON_SCALE: "spring constant and friction have changed alike, to {change:times} the "
-    "baseline: one common factor points to {scale} rather than to spring and packing at once: "
-    "check them",
-    Code.SPRING_CHANGED: "the spring constant has changed"
-    "{with_preload:?, and its preload with it}: {change:times} the baseline, now {value:.4g} N/m: "
-    "check the spring{causes:list , and | and |, which would look the same}",
+    Code.BASELINE_WITHOUT_SLIDING: "not compared with the baseline: it has no sliding friction, "
+    "the only friction that moves in service "
+    "determine; " + _SET_BASELINE,
+    Code.BASELINE_AT_OTHER_SPEED: "not compared with the baseline: it was taken at {healthy:in "
+    ".2g mm/s} mm/s and the moves at {speed:in .2g mm/s} mm/s, more "
+    "than a factor of {factor:g} apart; " + _SET_BASELINE,
+    Code.COMMON_SCALE: "spring constant and friction have both changed to {change:times} the "
+    "baseline: a common factor points to {scale} rather than to spring and "
+    "packing at once; check them",
+    Code.SPRING_CHANGED: "the spring constant has changed{with_preload:? together with its "
+    "preload}: {change:times} the baseline, now {value:.4g} N/m: check the "
+    "spring{causes:list , and | and |, which would have the same effect}",
     Code.BALANCE_SHIFTED: "the force balance has shifted: spring preload {change:by N}, "
-    "{share:percent} of the spring's force over the travel: check {causes:list | or |}",
+    "{share:percent} of the spring's force over the travel; check "
+    "{causes:list | or |}",
     Code.BENCH_SET: "the bench set",
-    Code.DRIVE_ZERO: "the zero of the {drive:drive} sensor ({reading:+.3g} {unit} in its reading)",
-    Code.POSITION_ZERO: "the zero of the position sensor ({reading:in +.2g mm} mm in its reading)"
-    "{stops:of stops}",
-    Code.UNEVEN_PACKING: "packing whose friction is larger {upward:?up|down}ward",
-    Code.SLIP_GROWN: "the slip jump has grown: static above sliding friction {change:by N}, which "
-    "makes the stem jump by {share:percent} of its travel: check packing, stem and guides for "
-    "sticking",
+    Code.DRIVE_ZERO: "the zero of the {drive:drive} sensor ({reading:+.3g} {unit})",
+    Code.POSITION_ZERO: "the zero of the position sensor ({reading:in +.2g mm} mm){stops:of stops}",
+    Code.UNEVEN_PACKING: "packing with more friction {upward:?up|down}ward",
+    Code.SLIP_GROWN: "the slip jump has grown: static friction exceeds sliding friction by "
+    "{change:by N} more than in the baseline, and the stem jumps by "
+    "{share:percent} of its travel; check packing, stem and guides for sticking",
     Code.VISCOUS_CHANGED: "viscous friction has {grown:?grown|fallen} to {change:times} the "
-    "baseline: check packing and lubricant, and the air path of the actuator; a changed lag "
-    "between the signals would look much the same",
-    Code.ASYMMETRY_CHANGED: "viscous friction has become larger {upward:?up|down}ward: share "
-    "{change:by}: check stem and packing for wear on one side, and the air path for a throttle "
-    "that acts in one direction only",
+    "baseline: check packing and lubricant, and the air path of the "
+    "actuator; a change in lag between the signals would look similar",
+    Code.ASYMMETRY_CHANGED: "viscous friction has grown {upward:?up|down}ward (share "
+    "{change:by}): check stem and packing for one-sided wear, and the air "
+    "path for a restriction that acts in one direction only",
     Code.NOISE_GROWN: "the noise of the {signal:of signal} has grown to {change:times} the "
     "baseline: check the sensor, its cable, its supply and its mounting",
-    Code.LAG_CHANGED: "the stem has become {later:?later|earlier} relative to the {drive:drive}: "
+    Code.LAG_CHANGED: "the lag of the stem behind the {drive:drive} has {later:?grown|shrunk}, "
     "{change:by ms}: check filters and clocks of both sensors, and tubing and volume between "
-    "sensor and actuator; a changed viscous friction would look much the same",
-    Code.STOPS_MOVED_ALIKE: "both travel stops have moved alike, by {change:by mm}: the zero of "
-    "the position sensor or its coupling to the stem has moved: check its mounting",
-    Code.TRAVEL_LOST: "travel is lost at its {stop:of end}: the stem stops {change:by mm} from "
-    "where it went before: check for dirt or a foreign part in the trim, an adjusted stop, and the "
-    "{sensor:of sensor} of the position sensor",
-    Code.STOP_MOVED_OUTWARD: "the travel stop at its {stop:of end} has moved outward by "
-    "{change:by mm}: check seat and plug for wear, stop and coupling, and the {sensor:of sensor} "
-    "of the position sensor",
-    Code.STOOD_STILL: "the stem has stood still at {position:in .1f mm} mm since {since:minute} "
-    "while its {drive:drive} changed by {change:.3g} {unit}: more than {ratio:.2g} times the "
-    "friction of the baseline holds it, or a part in the trim or a lock does, or the position "
-    "sensor has stopped: look at the stem",
-    Code.HELD_IN_TEST: "the stem stayed at {position:in .1f mm} mm in a test while the force "
-    "should have moved it: static friction is at least {friction:.3g} N, {ratio:.2f} times the "
-    "friction of the baseline, or something blocks the stem: look at the stem, and repeat the "
-    "test with more force",
+    "sensor and actuator; a change in viscous friction would look similar",
+    Code.STOPS_MOVED_ALIKE: "both travel stops have shifted by {change:by mm}: the zero of the "
+    "position sensor or its coupling to the stem has shifted; check its "
+    "mounting",
+    Code.TRAVEL_LOST: "travel is lost at the {stop:of end}: the stem stops {change:by mm} from "
+    "its former stop; check for dirt or a foreign part in the trim, an adjusted "
+    "stop, and the {sensor:of sensor} of the position sensor",
+    Code.STOP_MOVED_OUTWARD: "the travel stop at the {stop:of end} has moved outward by "
+    "{change:by mm}: check seat and plug for wear, check stop and "
+    "coupling, and the {sensor:of sensor} of the position sensor",
+    Code.STOOD_STILL: "the stem has not moved from {position:in .1f mm} mm since {since:minute} "
+    "although its {drive:drive} changed by {change:.3g} {unit}: it is held by "
+    "more than {ratio:.2g} times the friction of the baseline, by a part in the "
+    "trim or by a lock, or the position sensor has failed; inspect the stem",
+    Code.HELD_IN_TEST: "the stem stayed at {position:in .1f mm} mm in a test although the force "
+    "should have moved it: static friction is at least {friction:.3g} N, "
+    "{ratio:.2f} times the friction of the baseline, or the stem is blocked; "
+    "inspect the stem and repeat the test with more force",
     Code.BUFFER_CLEARED: "{because}: the buffer was cleared",
     Code.CLEARED_ON_REQUEST: "on request",
     Code.CLEARED_AS_SETTINGS: "valve or window parameters were changed",
     Code.CLEARED_AS_RECORD_BEGINS: "a new record begins",
-    Code.CLEARED_AS_STAMPS_GO_BACK: "the buffer is cleared as stamps go back",
-    Code.STAMPS_WENT_BACK: "stamps of {signal} went back by {seconds:.3g} s",
+    Code.CLEARED_AS_STAMPS_GO_BACK: "time stamps go backwards: the buffer is cleared",
+    Code.STAMPS_WENT_BACK: "the time stamps of {signal} returned by {seconds:.3g} s",
     Code.TIME_JUMPED: "ROS time jumped by {seconds:.3g} s",
     Code.TIME_JUMPS: "ROS time jumps",
     Code.SAMPLE_DAMAGED: "{signal} is damaged",
-    Code.SAMPLE_NO_JOINT: "{signal} without a position of the joint",
+    Code.SAMPLE_NO_JOINT: "{signal} has no position for the joint",
     Code.SAMPLE_NOT_FINITE: "{signal} is not finite",
     Code.SAMPLE_OUT_OF_RANGE: "{signal} outside {span}",
-    Code.SAMPLE_REPEATED: "{signal} repeats a stamp",
-    Code.SAMPLE_OVERTAKEN: "{signal} was overtaken on its way: its stamp is a little before the "
+    Code.SAMPLE_REPEATED: "{signal} repeats a time stamp",
+    Code.SAMPLE_OVERTAKEN: "{signal} arrived out of order: its time stamp is slightly before the "
     "last one",
-    Code.SAMPLE_BACK: "{signal} went back in time",
+    Code.SAMPLE_BACK: "{signal} returned in time",
     Code.SENSOR_RANGE: "the sensor's range {lowest:g} to {highest:g} Pa",
     Code.ANY_VALVE_RANGE: "the range of any valve, {lowest:g} to {highest:g} m",
     Code.DATA_FAULT: "{signal:or the stamps}: {cause:of sample_fault}{kind:of fault}",
-    Code.OUTSIDE_TRAVEL: "stem_state: {share:rounded} of its samples lie outside the travel, as at "
-    "{reading:.4g} m, and the travel is 0 to {travel:.4g} m: check unit (m), zero and travel"
-    "{question:after : }",
+    Code.OUTSIDE_TRAVEL: "stem_state: {share:rounded} of its samples lie outside the travel of 0 "
+    "to {travel:.4g} m, for example {reading:.4g} m: check unit (m), zero "
+    "and travel{question:after : }",
     Code.STAMPS_APART: "stem_state is stamped {seconds:.3g} s {is_ahead:?later|earlier} than "
-    "actuator_pressure: synchronise the clocks of both sensors, and check delays on the way",
-    Code.STAMPS_OFF_CLOCK: "the stamps of {signal:or both inputs} are {seconds:.3g} s "
-    "{is_ahead:?ahead of|behind} the clock of this node: synchronise the clocks; for a recording "
-    "set use_sim_time and play it with --clock, or set clock_tolerance to 0",
+    "actuator_pressure: synchronise the clocks of both sensors, and check for "
+    "transmission delays",
+    Code.STAMPS_OFF_CLOCK: "the time stamps of {signal:or both inputs} are {seconds:.3g} s "
+    "{is_ahead:?ahead of|behind} the clock of this node: synchronise the "
+    "clocks; for a recording, set use_sim_time and play it with --clock, "
+    "or set clock_tolerance to 0",
     Code.REJECTED: "{signal}: {share:rounded} of its samples are rejected{usable:after , }: {why}",
     Code.REJECTED_FOR: "{cause:of rejected}",
-    Code.REJECTED_WITHOUT_JOINT: "they have no position of the joint{joint:quoted}: name it in the "
+    Code.REJECTED_WITHOUT_JOINT: "no position for the joint{joint:quoted}: name it in the "
     "messages, or set joint",
     Code.PRESSURE_OUT_OF_RANGE: "{reading:.4g} Pa is outside the sensor's range {lowest:g} to "
     "{highest:g} Pa: check sensor and unit (Pa), or correct pressure_minimum and pressure_maximum",
     Code.POSITION_OUT_OF_RANGE: "{reading:.4g} m is outside the range of any valve, up to "
     "{highest:g} m: check sensor and unit (m)",
-    Code.NONE_USABLE: "no sample has been usable yet",
-    Code.LAST_USABLE: "the last usable one came {seconds:.0f} s ago",
-    Code.STEPS_IGNORED: "the stem ignored {number} of the latest {steps} steps of its command of "
+    Code.NONE_USABLE: "no usable sample yet",
+    Code.LAST_USABLE: "last usable sample {seconds:.0f} s ago",
+    Code.STEPS_IGNORED: "the stem ignored {number} of the latest {steps} command steps of "
     "{least:percent} of the travel or more: {cause:of cause}",
-    Code.ANSWER_LATE: "the stem begins to move {median:.2g} s after its command (median of "
+    Code.ANSWER_LATE: "the stem starts to move {median:.2g} s after its command (median of "
     "{moves} moves, limit {limit:g} s): {cause:of cause}",
-    Code.ANSWER_SLOW: "the stem has moved by 86 % {median:.2g} s after its command (median of "
-    "{moves} moves, limit {limit:g} s): {cause:of cause}",
-    Code.RESTS_AWAY: "the stem rests {median:percent} of its travel away from its command (median "
-    "of {moves} moves, limit {limit:percent}): {cause:of cause}",
+    Code.ANSWER_SLOW: "the stem reaches 86 % of its move {median:.2g} s after its command (median "
+    "of {moves} moves, limit {limit:g} s): {cause:of cause}",
+    Code.RESTS_AWAY: "the stem settles {median:percent} of its travel away from its command "
+    "(median of {moves} moves, limit {limit:percent}): {cause:of cause}",
     Code.HUNTS: "the stem hunts by {amplitude:percent} of its travel every {period:.2g} s at a "
     "constant command: {cause:of cause}",
-    Code.COMMANDS_UNUSABLE: "no command of stem_command can be used: {problem}",
-    Code.PACKING_TRAVEL: "packing life: {used:.4g} m of travel of {limit:.6g} (travel_limit)"
-    "{state}: renew the packing, then call ~/reset_usage",
-    Code.PACKING_REVERSALS: "packing life: {used:.0f} reversals of {limit:.6g} (reversal_limit)"
-    "{state}: renew the packing, then call ~/reset_usage",
+    Code.COMMANDS_UNUSABLE: "no command on stem_command can be used: {problem}",
+    Code.PACKING_TRAVEL: "packing life: {used:.4g} m of {limit:.6g} m travelled "
+    "(travel_limit){state}: replace the packing, then call ~/reset_usage",
+    Code.PACKING_REVERSALS: "packing life: {used:.0f} of {limit:.6g} reversals "
+    "(reversal_limit){state}: replace the packing, then call "
+    "~/reset_usage",
     Code.LIMIT_REACHED: ": reached",
     Code.LIMIT_EXPECTED: ", expected on {expected:day}",
-    Code.LIMIT_NEAR: ", near its limit (warned before)",
+    Code.LIMIT_NEAR: ", close to its limit (previously warned)",
 }
 
 _HEADLINES = {
@@ -742,7 +752,7 @@ _HEADLINES = {
     Code.NOT_COMPARED: "no comparison with the baseline",
     Code.WAS_COMPARED: "{what} was {ratio:figures} times its baseline",
     Code.DOUBTED: "{doubt}",
-    Code.SCALED: "friction and spring constant have changed by one factor",
+    Code.SCALED: "friction and spring constant have changed by the same factor",
     Code.DATED: "{of:headline}",
     Code.AGED: "{of:headline}",
     Code.STANDS_UNCOMPARED: "{alarm:headline}",
@@ -754,18 +764,22 @@ _HEADLINES = {
 
 
 _ADVICE = {
-    ("friction_high", "WARN"): "Plan new packing for the next stop.",
-    ("friction_high", "ERROR"): "Renew the packing at the next stop; keep the loop in manual where "
-    "it oscillates.",
-    ("friction_low", "WARN"): "Look for leakage at the packing on the next round.",
-    ("friction_low", "ERROR"): "Look for leakage at the packing now.",
-    ("stuck", ""): "Keep the loop in manual; stroke the valve locally, and check packing, trim and "
-    "actuator.",
+    ("friction_high", "WARN"): "Plan to replace the packing at the next shutdown.",
+    (
+        "friction_high",
+        "ERROR",
+    ): "Replace the packing at the next shutdown; keep the loop in manual if it oscillates.",
+    ("friction_low", "WARN"): "Check the packing for leakage on the next round.",
+    ("friction_low", "ERROR"): "Check the packing for leakage now.",
+    (
+        "stuck",
+        "",
+    ): "Put the loop in manual, stroke the valve locally, and check packing, trim and actuator.",
     ("whole_valve", ""): "Check the part named in the message at the next opportunity.",
     (
         "data_quality",
         "",
-    ): "Check the sensor and its connection; the valve is not monitored until then.",
+    ): "Check the sensor and its connection; the valve is not monitored until this is fixed.",
     ("positioner", ""): "Check the positioner and its air supply, and the tuning of the loop.",
 }
 

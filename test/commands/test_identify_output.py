@@ -69,9 +69,9 @@ class TestTable:
                 assert f"{name} {entry['verdict']}: {entry['reason']}" in words
         misfit = result.misfit
         share = f"{100 * misfit.rms / BENCH_VALVE.travel:.2g} % of travel"
-        assert f"fit {100 * misfit.fit:.2f} %: the most probable model's stem is" in words
+        assert f"fit {100 * misfit.fit:.2f} %: the stem of the most probable model is" in words
         assert f"{misfit.rms * 1e6:.3g} µm rms from the measured stem, {share}; " in words
-        assert f"; {misfit.systematic * 1e6:.3g} µm of it is not noise" in words
+        assert f"; {misfit.systematic * 1e6:.3g} µm of this is not noise" in words
         sweep = answer["evidence"]
         assert f"threshold δv {sweep['threshold']:.4g} m/s, {sweep['samples']} samples" in words
         assert "window 31 samples" in words
@@ -80,7 +80,7 @@ class TestTable:
 
     def test_doubt_of_the_model_is_a_note(self, result, capsys):
         """And what was not identified leaves a dash, the published value beside it or not."""
-        doubt = "the Karnopp model does not describe this valve: 98 µm [of it] are not noise"
+        doubt = "the Karnopp model does not describe this valve: 98 µm [of the misfit] is not noise"
         friction = Parameter(
             "coulomb_friction", math.nan, math.nan, math.nan, Verdict.NOT_IDENTIFIABLE, doubt
         )

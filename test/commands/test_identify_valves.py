@@ -252,8 +252,8 @@ def test_a_scale_of_the_sensor_qualifies_the_friction(
     answer = json.loads(out)
     assert (answer["diagnosis"]["level"], answer["diagnosis"]["ne_107"]) == ("WARN", "C")
     assert answer["diagnosis"]["message"].startswith(
-        "friction and spring constant have changed by one factor, which points to the scale of "
-        "the pressure sensor and the diaphragm area: check both before any work on the packing"
+        "friction and spring constant have changed by the same factor, which points to the scale "
+        "of the pressure sensor and the diaphragm area: check both before working on the packing"
     )
     report = PageReader(page.read_text())
     # Half as much again is beyond spring_failure: an error, but of the sensors.
@@ -312,7 +312,7 @@ def test_it_is_said_at_the_end_of_the_table(call, graphite_file):
     code, out, _ = call(RECORDING, "--valve", graphite_file, "--method", "bench")
     assert code == 0
     assert "no baseline yet" in out.splitlines()[-1]
-    assert out.rstrip().endswith("good, by the limits of the first survey")
+    assert out.rstrip().endswith("good by the limits for a first survey")
 
 
 @pytest.mark.parametrize(("given", "survey"), CASES[:2])

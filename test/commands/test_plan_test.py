@@ -148,7 +148,7 @@ def test_refusals(refusal, tmp_path):
     narrow = refusal(*SPRING, "--coulomb-friction", "900", "--from", "49", "--to", "51")
     assert narrow.startswith("a reversal would not move the stem between 49 and 51 %")
     assert narrow.endswith("widen the part of the travel")
-    assert refusal(*KNOWN, "--duration", "3").startswith("3 s have no room")
+    assert refusal(*KNOWN, "--duration", "3").startswith("3 s do not allow")
     assert refusal(*KNOWN, "--from", "70", "--to", "30").startswith("the part of the travel")
     assert "2 spring" not in refusal(*KNOWN, "--friction-factor", "0.5")
     assert refusal(*SPRING, "--spring-constant", "0").startswith("a machine without a spring")

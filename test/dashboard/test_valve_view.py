@@ -203,7 +203,7 @@ def test_what_is_missing_to_a_baseline_is_read_by_its_type():
     dry, slid, valve = made_up(**said).lacks
     assert (dry.of, dry.lack) == ("coulomb_friction", Lack.VALUE)
     assert (slid.lack, slid.share, slid.largest) == (Lack.PRECISION, 0.41, 0.33)
-    assert slid.words == "sliding friction is known to ±41 %, and a baseline needs ±33 %"
+    assert slid.words == "sliding friction is known to ±41 %, but a baseline requires ±33 %"
     assert (valve.of, valve.lack) == ("valve", Lack.HEALTH)
 
 

@@ -280,7 +280,7 @@ def test_the_class_of_the_packing_counts_in_the_history_and_on_its_page(tmp_path
     with table.open() as stream:
         assert [row["survey"] for row in csv.DictReader(stream)] == ["watch"]
     (entry,) = entries(tmp_path, "FV-102")
-    assert entry.diagnosis.message.endswith("watch it, by the limits of the first survey")
+    assert entry.diagnosis.message.endswith("watch, by the limits for a first survey")
     valves = Plant(math.inf)
     KeptValves(place, valves).refresh()
     (shown,) = valves.valves(1e9)
@@ -355,7 +355,7 @@ class TestDashboard:
         (raised,) = kept.alarms(AlarmFilter(), is_journal=True)
         local = QUARTERS[2].replace(tzinfo=ZoneInfo("Europe/Berlin")).timestamp()
         assert raised.event.time / 1e9 == pytest.approx(local + 20.0, abs=0.1)
-        assert self.view(valves).view.advice == "Plan new packing for the next stop."
+        assert self.view(valves).view.advice == "Plan to replace the packing at the next shutdown."
         assert ask("acknowledge").success
         assert "cannot be acknowledged" in ask("acknowledge").message
         assert not ask("identify").success
@@ -386,7 +386,7 @@ class TestDashboard:
                     assert page.title() == "FV-101 · valve friction"
                     assert "2026-07-03 08:00:19 CEST" in page.inner_text("article")
                     assert not page.get_by_role("button", name="Identify").count()
-                    tab.open("/alarms").get_by_text("Plan new packing").wait_for()
+                    tab.open("/alarms").get_by_text("Plan to replace the packing").wait_for()
                     page = tab.open("/compare?a=/fv_101/identifier&b=/fv_102/identifier")
                     page.get_by_text("differs").first.wait_for()
                     # Its numbers are read: what compiles kernels (60 MB) stays away.

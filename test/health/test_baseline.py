@@ -107,11 +107,10 @@ class TestOfAResult:
         with pytest.raises(RefusalError) as refusal:
             Baseline.of(known(35.0, 80.0))
         assert str(refusal.value) == (
-            "this result cannot be the baseline: coulomb friction is known to ±35 %, and a "
-            "baseline needs ±33 %; sliding friction is known to ±40 %, and a baseline needs "
-            "±33 %: record "
-            "more strokes, some fast and some slow, and state a timing_uncertainty if the clocks "
-            "and lags of both signals are known"
+            "this result cannot be the baseline: coulomb friction is known to ±35 %, but a "
+            "baseline requires ±33 %; sliding friction is known to ±40 %, but a baseline requires "
+            "±33 %: record more strokes, some fast and some slow, and set timing_uncertainty if "
+            "the clocks and lags of both signals are known"
         )
 
         assert (
@@ -129,7 +128,7 @@ class TestOfAResult:
     def test_what_a_wide_one_cannot_show_is_said(self):
         assert Baseline(100.0, 13.0).remark == Baseline(100.0).remark == ""
         assert Baseline(100.0, 13.0, SlidingFriction(200.0, 66.0, 8e-3)).remark == ""
-        words = "it is known to ±33 %: only friction that has grown to 2 times is certain to be"
+        words = "it is known to ±33 %: only growth to 2 times or more is certain to be"
         assert Baseline(sliding=SlidingFriction(200.0, 66.0, 8e-3)).remark.startswith(words)
         assert Baseline(100.0, 33.0).remark.startswith(words)
 
@@ -177,9 +176,9 @@ def test_an_alarm_says_when_friction_changed():
     for healthy, reference in ((baseline(), None), (None, first)):
         found = diagnosis_by_evidence(grown, VALVE, healthy, LIMITS, reference)
         assert found.level is Level.WARN
-        assert "; it changed between 2023-11-15" in found.message
+        assert "; the change occurred between 2023-11-15" in found.message
     steady = diagnosis_by_evidence(evidence(lambda _: 300.0), VALVE, baseline(), LIMITS)
-    assert "it changed" not in steady.message
+    assert "the change occurred" not in steady.message
 
 
 class TestReference:
@@ -195,7 +194,7 @@ class TestReference:
         assert now.change is None
         found = self.found(now)
         assert (found.level, found.status_signal) == (Level.WARN, StatusSignal.MAINTENANCE_REQUIRED)
-        assert "times what it was until 2023-11-15" in found.message
+        assert "times its value up to 2023-11-15" in found.message
         assert "no baseline: call ~/set_baseline while it is healthy" in found.message
         assert found.ratio.value == pytest.approx(1.5, rel=0.05)
 
@@ -219,7 +218,7 @@ class TestReference:
         ("healthy", "words"),
         [
             (Baseline(600.0), "has no sliding friction"),
-            (Baseline(sliding=SlidingFriction(300.0, 10.0, 6e-3)), "belongs to 6 mm/s"),
+            (Baseline(sliding=SlidingFriction(300.0, 10.0, 6e-3)), "taken at 6 mm/s"),
         ],
     )
     def test_it_stands_in_for_a_baseline_that_cannot_be_compared(self, healthy, words):
@@ -243,7 +242,7 @@ class TestReference:
         found = self.found(evidence_of(moves, VALVE, EXACT), reference=reference)
         assert found.level is Level.WARN
         assert found.message.startswith("friction has grown: sliding friction at 3.")
-        assert "what it was before it changed, between 2023-11-1" in found.message
+        assert "its value before the change between 2023-11-1" in found.message
         assert found.ratio.low <= 1.5 <= found.ratio.high
         small = evidence(lambda hour: 350.0 if hour >= 2 else 300.0, hours=4.0)
         assert small.change is not None

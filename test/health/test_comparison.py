@@ -358,8 +358,8 @@ GROWN = Diagnosis(
     Ratio.between(2.2, 2.1, 2.3),
 )
 WORDS = (
-    "friction and spring constant have changed by one factor, which points to the scale of the "
-    "pressure sensor and the diaphragm area: check both before any work on the packing; "
+    "friction and spring constant have changed by the same factor, which points to the scale of "
+    "the pressure sensor and the diaphragm area: check both before working on the packing; "
 )
 
 
@@ -405,7 +405,7 @@ class TestWholeRecords:
     def test_by_a_result(self, healthy, scaled):
         found = diagnose_valve(scaled, Baseline.of(healthy))
         assert found.friction.message.startswith(WORDS)
-        assert "one common factor" in found.findings[0].message
+        assert "a common factor" in found.findings[0].message
         assert compare(scaled, healthy) == found.friction
 
     def test_by_the_monitor(self, healthy, scaled):
@@ -496,7 +496,7 @@ def test_limits_are_in_order():
 
 @pytest.mark.parametrize(
     ("packing", "expected", "words"),
-    [((), Survey.GOOD, ": good, by"), ((HIGH_FRICTION,), Survey.BAD, ": bad, by")],
+    [((), Survey.GOOD, ": good by"), ((HIGH_FRICTION,), Survey.BAD, ": bad by")],
 )
 def test_the_packings_of_the_paper(packing, expected, words):
     """(F_c + F_s)/(k·travel): 2·152.7/5858 = 5.2 % of the one, 2·606/5858 = 20.7 % of the other."""

@@ -245,7 +245,7 @@ class TestUnknownFriction:
             )
             assert found.message == (
                 "friction collapsed, the packing may leak: coulomb friction is too small to be "
-                f"identified, at most {bound:.2g} N; its baseline is 128 N"
+                f"identified (at most {bound:.2g} N); its baseline is 128 N"
             )
         else:
             assert found.level == Level.OK
@@ -271,8 +271,8 @@ class TestUnknownFriction:
         assert (found.level, found.status_signal) == (Level.WARN, StatusSignal.CHECK_FUNCTION)
         assert found.ratio is None
         assert found.message == (
-            "coulomb friction is −20.0 ± 3.0 N, and friction is above zero: check the direction of "
-            "both signals"
+            "coulomb friction is −20.0 ± 3.0 N, but friction cannot be negative: check the "
+            "direction of both signals"
         )
 
     def test_zero_is_a_friction_without_an_interval_of_its_ratio(self, with_values):
@@ -338,7 +338,7 @@ class TestSlidingFriction:
         result = slid(300.0, speed=2e-3, coulomb_friction=unknown(), viscous_friction=unknown())
         found = diagnose(result, BENCH_VALVE, Baseline(sliding=self.SLIDING))
         assert (found.level, found.ratio) == (Level.OK, None)
-        assert "the stem slides at 2 mm/s, and at 8 mm/s in the baseline" in found.message
+        assert "the stem slid at 2 mm/s, but at 8 mm/s in the baseline" in found.message
 
     def test_too_small_to_be_identified_it_has_collapsed(self, slid, unknown):
         """Half of 196 N is 98 N; at 4 mm/s, 49 N may be 98 N at twice the speed."""
@@ -364,7 +364,7 @@ class TestSlidingFriction:
 
 
 class TestModelDoubt:
-    DOUBT = "the Karnopp model does not describe this valve (98 µm of misfit); "
+    DOUBT = "the Karnopp model does not describe this valve (misfit 98 µm); "
 
     @pytest.fixture
     def doubted(self, with_values):
@@ -438,8 +438,8 @@ class TestWords:
             None,
         )
         assert found.message == (
-            "no baseline yet; the stem ignores reversals smaller than 5.2 % of its travel: good, "
-            "by the limits of the first survey"
+            "no baseline yet; the stem ignores reversals smaller than 5.2 % of its travel: good "
+            "by the limits for a first survey"
         )
 
     def test_without_a_travel_the_friction_itself_is_told(self, with_values, friction):
@@ -467,7 +467,11 @@ class TestLimits:
         ],
     )
     def test_out_of_order(self, limits):
-        with pytest.raises(ValueError, match=r"^limits must obey 0 < low_ratio < 1 < warn_ratio <"):
+        with pytest.raises(
+            ValueError,
+            match=r"^limits must satisfy 0 < low_ratio < 1 < "
+            r"warn_ratio <",
+        ):
             FrictionLimits(**limits)
 
 

@@ -142,7 +142,7 @@ class TestLongRecord:
         snapshot = Snapshot(next(signals), next(signals), (), None)
         result = identify_snapshot(snapshot, replaced(method="bench"))
         assert result.evidence["averaged_samples"] == 2
-        assert result.findings[-1] == "the record is of means of 2 samples that follow each other"
+        assert result.findings[-1] == "the record consists of averages of 2 successive samples"
         assert len(result.recording) == MOST_SAMPLES
         assert result.recording.sample_period == 1e-3
         # The motion takes thousands of samples, so pairs of them say what they say by themselves.
@@ -192,11 +192,11 @@ class TestIdentification:
 
     def test_and_why_the_buffer_was_emptied(self):
         monitor = FrictionMonitor(SETTINGS)
-        monitor.buffer.clear("time went back")
+        monitor.buffer.clear("time returned")
         with pytest.raises(RefusalError) as refusal:
             identify_snapshot(monitor.buffer.snapshot(), SETTINGS)
         assert str(refusal.value).startswith("no samples of actuator_pressure")
-        assert str(refusal.value).endswith(" (the buffer was cleared: time went back)")
+        assert str(refusal.value).endswith(" (the buffer was cleared: time returned)")
 
 
 class TestMemory:
@@ -235,7 +235,7 @@ class TestMemory:
         refused = said(Code.REFUSED, reason="the stem did not move", of=verdict.statement)
         assert monitor.diagnosis() == dataclasses.replace(verdict, statement=refused)
         assert monitor.diagnosis().message == (
-            "the latest identification was refused: the stem did not move; before: "
+            "the latest identification was refused: the stem did not move; previous result: "
             + verdict.message
         )
 
@@ -251,7 +251,7 @@ class TestInternalError:
             Level.ERROR,
             StatusSignal.CHECK_FUNCTION,
         )
-        assert diagnosis.message == f"internal error: a bug; before: {good.message}"
+        assert diagnosis.message == f"internal error: a bug; previous result: {good.message}"
         assert (monitor.result, monitor.refusal) == (result, None)
 
         monitor.refuse(RefusalError("the stem did not move"))
@@ -266,7 +266,7 @@ class TestInternalError:
         monitor.fail("internal error: a bug")
         assert monitor.diagnosis().level == Level.ERROR
         assert monitor.diagnosis().message == (
-            "internal error: a bug; before: no estimate: nothing has been identified yet"
+            "internal error: a bug; previous result: no estimate: nothing has been identified yet"
         )
 
     def test_an_alarm_stays(self, result):

@@ -71,7 +71,7 @@ def test_lost_travel(healthy, share):
         identify(record, BENCH_VALVE)
     known = KnownNumbers().followed_by(healthy.numbers, 0).followed_by(numbers(record), 1)
     (finding,) = known.findings(healthy, BENCH_VALVE)
-    assert "travel is lost at its lower end" in finding.message
+    assert "travel is lost at the lower end" in finding.message
     assert known.numbers["lower_stop"].value == pytest.approx(share * TRAVEL, abs=5e-5)
     assert "measured" not in finding.message
 
@@ -380,9 +380,9 @@ def test_static_friction_of_the_baseline_counts():
     assert standstill_finding(still, ACTUATOR, sticky, 2.0) is None
     found = standstill_finding(still, ACTUATOR, HEALTHY, 2.0)
     assert found.friction_ratio == pytest.approx(500 / 105)
-    assert "at 10.0 mm since 1970-01-01 00:00 UTC while its pressure changed by 20 kPa" in str(
-        found
-    )
+    assert (
+        "from 10.0 mm since 1970-01-01 00:00 UTC although its pressure changed by 20 kPa"
+    ) in str(found)
 
 
 def test_a_healthy_simulated_valve_is_never_stuck(bench_record):

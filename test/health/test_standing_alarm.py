@@ -177,7 +177,7 @@ def test_the_demonstration_of_a_bad_measurement(sliding):
 def test_a_friction_below_zero_ends_nothing(monitor, sliding, speed):
     monitor.accept(sliding(-3.0, speed), START + 1)
     assert monitor.diagnosis().level is Level.ERROR
-    assert "friction is above zero" in monitor.diagnosis().message.split(DATED)[1]
+    assert "friction cannot be negative" in monitor.diagnosis().message.split(DATED)[1]
 
 
 def test_a_new_baseline_ends_it(monitor, nothing):
@@ -334,7 +334,7 @@ def test_a_weaker_record_leaves_the_finding_and_its_date(changed, level, words):
     (later,) = after(WHOLE, changed, WITHIN, {}).findings(HEALTHY_NUMBERS, ACTUATOR)
     assert (later.level, later.status_signal) == (level, at_first.status_signal)
     assert words in later.message
-    assert later.message.endswith("(measured 1970-01-02 00:00 UTC; no record since shows it)")
+    assert later.message.endswith("(measured 1970-01-02 00:00 UTC; not seen in any record since)")
 
 
 @pytest.mark.parametrize("changed", [LOST, WEAK])
@@ -413,7 +413,7 @@ HEALTHY_FRICTION = Baseline(100.0, 1.0)
 EARLIER_ALARM = Diagnosis(
     Level.ERROR, StatusSignal.FAILURE, quoted("excess friction: 4 times; so"), None
 )
-DOUBT = "the Karnopp model does not describe this valve (9 µm of misfit)"
+DOUBT = "the Karnopp model does not describe this valve (misfit 9 µm)"
 
 
 def kept_estimate(friction=400.0, diagnosis=EARLIER_ALARM, baseline=HEALTHY_FRICTION, **changes):
@@ -436,7 +436,7 @@ def monitor_with(earlier, baseline=HEALTHY_FRICTION, limits=None):
         (119 * 60 * SECOND, "119 min ago, "),
         (3.9 * 3600 * SECOND, "3 h ago, "),
         (2 * DAY, "2 days ago, "),
-        (-1, "in the future: a clock has been set back since, "),
+        (-1, "in the future: a clock has since been set back, "),
     ],
 )
 def test_the_alarm_goes_on_with_its_age(age, words):
@@ -464,7 +464,7 @@ def test_a_refusal_and_a_bug_leave_it():
     told = monitor.diagnosis(START)
     assert told.level == Level.ERROR
     assert told.message == (
-        "the latest identification was refused: the stem did not move; before: "
+        "the latest identification was refused: the stem did not move; previous result: "
         f"{EARLIER_ALARM.message} (identified 0 s ago, before the restart)"
     )
     monitor.fail("internal error: a bug")

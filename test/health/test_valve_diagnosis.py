@@ -94,17 +94,17 @@ def test_a_baseline_of_a_friction_alone_says_nothing():
         ({"spring_constant": (0.6 * SPRING, 1e3)}, ERROR, StatusSignal.FAILURE, "check the spring"),
         ({"spring_constant": (1.25 * SPRING, 1e3)}, WARN, MAINTENANCE, "1.25 times"),
         ({"spring_preload": (800.0, 20.0)}, WARN, MAINTENANCE, "check the bench set"),
-        ({"slip_force": (120.0, 20.0)}, WARN, MAINTENANCE, "jump by 2 % of its travel"),
+        ({"slip_force": (120.0, 20.0)}, WARN, MAINTENANCE, "jumps by 2 % of its travel"),
         ({"viscous_friction": (2e4, 4e2)}, WARN, MAINTENANCE, "viscous friction has grown to 4"),
         ({"viscous_friction": (1e3, 50.0)}, WARN, MAINTENANCE, "viscous friction has fallen"),
-        ({"viscous_asymmetry": (-0.5, 0.05)}, WARN, MAINTENANCE, "larger downward"),
-        ({"lower_stop": (2e-3, 1e-5)}, WARN, MAINTENANCE, "lost at its lower end: the stem stops"),
+        ({"viscous_asymmetry": (-0.5, 0.05)}, WARN, MAINTENANCE, "grown downward"),
+        ({"lower_stop": (2e-3, 1e-5)}, WARN, MAINTENANCE, "lost at the lower end: the stem stops"),
         ({"lower_stop": (-2e-3, 1e-5)}, WARN, MAINTENANCE, "lower end has moved outward by -2.00"),
-        ({"upper_stop": (TRAVEL - 2e-3, 1e-5)}, WARN, MAINTENANCE, "lost at its upper end"),
+        ({"upper_stop": (TRAVEL - 2e-3, 1e-5)}, WARN, MAINTENANCE, "lost at the upper end"),
         ({"stem_noise": (3e-5, 6e-7)}, WARN, FUNCTION, "noise of the stem position has grown to 3"),
         ({"drive_noise": (300.0, 6.0)}, WARN, FUNCTION, "noise of the pressure has grown to 3"),
-        ({"lag": (0.05, 0.003)}, WARN, FUNCTION, "later relative to the pressure: +50 ms"),
-        ({"lag": (-0.05, 0.003)}, WARN, FUNCTION, "earlier relative to the pressure: -50 ms"),
+        ({"lag": (0.05, 0.003)}, WARN, FUNCTION, "behind the pressure has grown, +50 ms"),
+        ({"lag": (-0.05, 0.003)}, WARN, FUNCTION, "behind the pressure has shrunk, -50 ms"),
     ],
 )
 def test_each_change_is_a_finding_of_its_own(changes, level, signal, words):
@@ -165,30 +165,30 @@ class TestCausesThatLookTheSame:
     def test_a_factor_beyond_the_failure_of_a_spring_is_an_error(self, factor, level):
         finding = only(found(**scaled(factor, *FORCES)))
         assert (finding.level, finding.status_signal) == (level, FUNCTION)
-        assert "one common factor points to the scale of the pressure sensor" in finding.message
+        assert "a common factor points to the scale of the pressure sensor" in finding.message
         assert "and the diaphragm area rather than to spring and packing" in finding.message
 
     @pytest.mark.parametrize("factor", [0.6, 1.4])
     def test_a_slip_jump_that_a_factor_does_not_explain_is_told(self, factor):
         common, slip = found(**scaled(factor, *FORCES), slip_force=(120.0, 5.0))
-        assert "one common factor" in common.message
+        assert "a common factor" in common.message
         assert slip.message.startswith("the slip jump has grown")
 
     def test_a_slip_jump_that_a_factor_explains_is_not(self):
         forces = scaled(4.0, *FORCES)
-        assert "one common factor" in only(found(**forces, slip_force=(80.0, 5.0))).message
+        assert "a common factor" in only(found(**forces, slip_force=(80.0, 5.0))).message
         assert len(found(**forces, slip_force=(180.0, 5.0))) == 2
 
     def test_a_vague_viscous_friction_that_a_factor_does_not_explain_is_told(self):
         forces = scaled(1.4, *FORCES[:-1])
         common, viscous = found(**forces, viscous_friction=(2e4, 4e3))
-        assert "one common factor" in common.message
+        assert "a common factor" in common.message
         assert viscous.message.startswith("viscous friction has grown to 4")
         forces = scaled(2.5, *FORCES[:-1])
         assert len(found(**forces, viscous_friction=(1.3e4, 1.9e3))) == 1
 
     def test_the_noise_of_a_new_scale_is_no_finding_of_its_own(self):
-        assert "one common factor" in only(found(**scaled(2.3, *FORCES, "drive_noise"))).message
+        assert "a common factor" in only(found(**scaled(2.3, *FORCES, "drive_noise"))).message
         both = found(**scaled(2.3, *FORCES), **scaled(6.0, "drive_noise"))
         assert len(both) == 2
         assert "noise of the pressure has grown to 6" in both[1].message
@@ -197,11 +197,11 @@ class TestCausesThatLookTheSame:
         message = only(found(**scaled(0.75, "spring_constant"))).message
         assert message.endswith("check the spring")
         longer = found(**scaled(0.75, "spring_constant"), **scaled(1 / 0.75, "upper_stop"))
-        assert "the position sensor's scale" in longer[0].message
+        assert "the scale of the position sensor" in longer[0].message
 
     def test_a_spring_whose_friction_stays_is_no_scale_of_the_pressure(self):
         message = only(found(**scaled(0.75, "spring_constant"), upper_stop=None)).message
-        assert "the position sensor's scale" in message
+        assert "the scale of the position sensor" in message
         assert "pressure" not in message
         unknown = found(
             **scaled(0.75, "spring_constant"), coulomb_friction=None, static_friction=None
@@ -218,16 +218,16 @@ class TestCausesThatLookTheSame:
 
     def test_a_weak_spring_takes_its_preload_with_it(self):
         finding = only(found(**scaled(0.5, "spring_constant", "spring_preload")))
-        assert "the spring constant has changed, and its preload with it" in finding.message
+        assert "the spring constant has changed together with its preload" in finding.message
 
     def test_a_shifted_balance_has_four_causes(self):
         message = only(
             found(spring_preload=(620.0, 1.0), lower_stop=None, upper_stop=None, limits=LOW)
         ).message
         assert "+120 N" in message
-        assert "the zero of the pressure sensor (+3 kPa in its reading)" in message
-        assert "the zero of the position sensor (-0.6 mm in its reading)" in message
-        assert "packing whose friction is larger upward" in message
+        assert "the zero of the pressure sensor (+3 kPa)" in message
+        assert "the zero of the position sensor (-0.6 mm)" in message
+        assert "packing with more friction upward" in message
 
     def test_stops_that_stay_exclude_the_position_sensor(self):
         message = only(found(spring_preload=(620.0, 1.0), limits=LOW)).message
@@ -246,10 +246,10 @@ class TestCausesThatLookTheSame:
             upper_stop=(TRAVEL + shift, 1e-5),
         )
         assert (
-            "check the zero of the position sensor (-2 mm in its reading), as both travel stops"
-            in balance.message
+            "check the zero of the position sensor (-2 mm), consistent with the shift of both "
+            "travel stops" in balance.message
         )
-        assert "both travel stops have moved alike, by -2.00 mm" in stops.message
+        assert "both travel stops have shifted by -2.00 mm" in stops.message
 
     @pytest.mark.parametrize("other", [None, HEALTHY["upper_stop"]])
     def test_one_stop_that_moves_with_the_balance_convicts_nothing(self, other):
@@ -266,8 +266,8 @@ class TestCausesThatLookTheSame:
         balance, stop = found(**changes)
         assert "the bench set or the zero of the pressure sensor (+10 kPa" in balance.message
         agrees = (
-            "or the zero of the position sensor (-2 mm in its reading), with which the move of "
-            "the one stop that was met agrees"
+            "or the zero of the position sensor (-2 mm), consistent with the shift of the one "
+            "travel stop reached"
         )
         assert (agrees in balance.message) == (other is None)
         assert ("position sensor" in balance.message) == (other is None)

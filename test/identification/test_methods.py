@@ -149,8 +149,7 @@ class TestProfiles:
         with pytest.raises(RefusalError) as refusal:
             identify(whole, BENCH_VALVE, settings, method)
         assert str(refusal.value) == (
-            f"the method {method} finds F_s itself and takes no known one: leave it out, or use "
-            "the method published"
+            f"the method {method} finds F_s itself: do not fix it, or use the method published"
         )
 
     @pytest.mark.parametrize("method", ["plant", "bench"])

@@ -110,12 +110,16 @@ def test_little_travel(healthy):
 
 def test_a_stem_that_does_not_move(healthy):
     still = Recording(PERIOD, healthy.pressure, np.full(len(healthy), 0.01))
-    refused(still, r"stem (did not move|moved 0\.\d+ mm).*excite the valve over several percent")
+    refused(still, r"stem (did not move|moved 0\.\d+ mm).*move the valve over several percent")
 
 
 def test_one_direction_only():
     record = recorded(np.linspace(70e3, 160e3, 26_000))
-    refused(record, r"^the stem moved up only \(.* mm up, .* mm down\).*one stroke each way")
+    refused(
+        record,
+        r"^the stem moved only up \(.* mm up, .* mm down\).*one stroke in each "
+        r"direction",
+    )
 
 
 @pytest.mark.parametrize("rest", [20e3, 230e3], ids=["lower", "upper"])
@@ -169,7 +173,7 @@ def test_a_force_on_a_diaphragm(healthy, method):
     """The valve of a force has no diaphragm, and that of a pressure has one."""
     force = replace(healthy, driven_by=Drive.FORCE)
     for recording, valve in ((force, BENCH_VALVE), (healthy, Valve(travel=BENCH_VALVE.travel))):
-        with pytest.raises(ValueError, match="leave the diaphragm_area of the valve out"):
+        with pytest.raises(ValueError, match="omit diaphragm_area"):
             METHODS[method](recording, valve)
 
 
@@ -259,8 +263,8 @@ def test_motion_is_ten_times_the_noise(share, moves):
     else:
         assert refusal(require_motion, record(position)) == (
             f"the stem did not move: its position spans {span * 1e6:.3g} µm with "
-            f"{position_noise(noise) * 1e6:.3g} µm of noise; "
-            "excite the valve over several percent of its travel"
+            f"{position_noise(noise) * 1e6:.3g} µm of noise; move the valve over several percent "
+            "of its travel"
         )
 
 
@@ -276,9 +280,10 @@ def test_a_fiftieth_of_the_way_goes_back(window, sign):
     require_two_directions(record(sign * triangle(0.97, 0.03)), window)
     text = refusal(require_two_directions, record(sign * triangle(0.985, 0.015)), window)
     way = "up" if sign > 0 else "down"
-    assert text.startswith(f"the stem moved {way} only (")
+    assert text.startswith(f"the stem moved only {way} (")
     assert text.endswith(
-        " mm down): friction and spring cannot be separated; record at least one stroke each way"
+        " mm down): friction and spring cannot be separated; record at least one stroke in each "
+        "direction"
     )
 
 
@@ -322,12 +327,12 @@ def test_the_stem_stays_within_a_twentieth_and_moves_a_hundredth(lowest, highest
 
 def test_what_is_said_of_the_travel():
     assert refusal(require_travel, record([0.001, 0.05]), VALVE) == (
-        "the stem position runs from 0.001 to 0.05 m, the travel from 0 to 0.02 m: "
-        "check that the signals are not swapped, and check unit (m), zero and travel"
+        "the stem position runs from 0.001 to 0.05 m, but the travel is 0 to 0.02 m: check that "
+        "the signals are not swapped, and check unit (m), zero and travel"
     )
     assert refusal(require_travel, record([0.01, 0.0100999]), VALVE) == (
-        "too little travel: the stem moved 0.0999 mm, 0.5 % of its travel; "
-        "excite the valve over several percent of it"
+        "too little travel: the stem moved 0.0999 mm, 0.5 % of its travel; move it over several "
+        "percent of the travel"
     )
     assert "moved 0.19 mm, 0.95 % of" in refusal(require_travel, record([0, 1.9e-4]), VALVE)
 
@@ -369,17 +374,17 @@ def test_a_twentieth_of_the_top_speed_is_motion(share, counts):
 def test_pressure_that_does_not_change():
     position = strokes().position
     assert refusal(require_related_signals, record(position, np.full(301, 1e5))) == (
-        "the pressure did not change: excite the valve, or check the pressure sensor"
+        "the pressure did not change: move the valve, or check the pressure sensor"
     )
     assert _followed(record(position, np.full(301, 1e5)))[1] == 0.0
 
 
 def test_unrelated_signals():
     assert refusal(require_related_signals, strokes(scatter=1e6)) == (
-        "pressure and stem do not move together (position and direction of the moving stem explain "
-        f"{100 * _followed(strokes(scatter=1e6))[1]:.0f} % of the pressure): check that both "
-        "signals belong to this valve, are not swapped, come from working sensors, and share one "
-        "clock"
+        "pressure and stem do not move together (position and direction of the moving stem "
+        f"explain {100 * _followed(strokes(scatter=1e6))[1]:.0f} % of the pressure): check that "
+        "both signals belong to this valve, are not swapped, come from working sensors, and that "
+        "they share one clock"
     )
 
 
@@ -408,7 +413,7 @@ def turned_over(upright):
 
 def test_a_stem_against_the_pressure():
     assert refusal(require_related_signals, turned_over(strokes())) == (
-        "the stem moves against the pressure: invert the position, so that it grows in the "
+        "the stem moves against the pressure: invert the position so that it increases in the "
         "direction in which pressure pushes the stem"
     )
 

@@ -128,8 +128,8 @@ class TestModels:
         assert compared.free == (6, 6)
         assert compared.independent < compared.samples
         words = str(without.against(result))
-        assert words.startswith("the record very strongly favours the second model: it is 1e")
-        assert "independent ones" in words
+        assert words.startswith("the record very strongly favours the second model, which is 1e")
+        assert "independent samples" in words
 
     def test_a_parameter_that_changes_nothing_counts_against(self, result):
         """ln(n)/2 for each one; given its own value the fit is as good."""
@@ -163,9 +163,9 @@ class TestModels:
     def test_two_wrong_models_are_said_to_be(self):
         noise = np.random.default_rng(3).normal(size=1000)
         words = str(models_compared((noise, 2 * noise), (5, 5), (False, False)))
-        assert "neither describes the valve to within noise" in words
+        assert "neither model describes the valve to within noise" in words
         same = models_compared((noise, noise), (5, 5))
-        assert str(same).startswith("the record hardly distinguishes the two models; ")
+        assert str(same).startswith("the record cannot distinguish between the two models; ")
         assert same.log_ratio == 0
 
 

@@ -165,7 +165,7 @@ class TestRecording:
     def test_force_is_no_pressure(self):
         force = Recording(**RECORDING, driven_by=Drive.FORCE)
         np.testing.assert_array_equal(force.drive, [1.0, 2.0, 3.0])
-        with pytest.raises(ValueError, match="holds a force and no pressure"):
+        with pytest.raises(ValueError, match="holds a force, not a pressure"):
             _ = force.pressure
         with pytest.raises(ValueError, match="drive force has 3 samples, position 2"):
             Recording(**RECORDING | {"position": [0.0, 0.1]}, driven_by=Drive.FORCE)

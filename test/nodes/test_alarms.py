@@ -137,7 +137,7 @@ def test_stamps_of_a_time_to_come(live, history, tmp_path):
     status = client.next_status()
     assert status.level == ERROR
     assert status.message.endswith(
-        " (identified in the future: a clock has been set back since, before the restart)"
+        " (identified in the future: a clock has since been set back, before the restart)"
     )
     assert values_of(status)["alarm_recording"] == str(tmp_path / "1")
     client.identified(HEALTHY)
@@ -208,9 +208,11 @@ def test_a_node_without_a_history_says_so_and_keeps_nothing(live, history):
     told = client.status_values()["history"]
     assert told == "none, as history_file is empty: diagnosis and baseline end with this node"
     client.identified(HEALTHY)
-    assert client.trigger("set_baseline").message == f"baseline: {OLD}; before: none{TAKEN}"
+    assert client.trigger("set_baseline").message == (
+        f"baseline: {OLD}; previous result: none{TAKEN}"
+    )
     assert client.last_values()["friction_ratio"] == "1"
-    assert client.trigger("restore_baseline").message == f"baseline: none; before: {OLD}"
+    assert client.trigger("restore_baseline").message == f"baseline: none; previous result: {OLD}"
     client.next_status(lambda one: "no baseline yet" in one.message, "no baseline")
     assert math.isnan(*client.parameters(NODE, "baseline_coulomb_friction"))
     assert not history.path.exists()
@@ -223,7 +225,9 @@ def test_the_baseline_is_guarded_and_restored(live, history):
     assert not nothing.success
     assert nothing.message.startswith("there is no ~/set_baseline to undo")
     client.identified(HEALTHY)
-    assert client.trigger("set_baseline").message == f"baseline: {OLD}; before: none{TAKEN}"
+    assert client.trigger("set_baseline").message == (
+        f"baseline: {OLD}; previous result: none{TAKEN}"
+    )
     client.identified(TIGHT)
     for service in ("set_baseline", "restore_baseline"):
         refused = client.trigger(service)
@@ -238,7 +242,7 @@ def test_the_baseline_is_guarded_and_restored(live, history):
     assert client.set_together(NODE, {"baseline_in_alarm": True}).successful
     answer = client.trigger("set_baseline")
     assert answer.success
-    assert answer.message == f"baseline: {NEW}; before: {OLD}{TAKEN}"
+    assert answer.message == f"baseline: {NEW}; previous result: {OLD}{TAKEN}"
     assert client.next_status().level == OK
     live.kill(node)
 
@@ -246,7 +250,7 @@ def test_the_baseline_is_guarded_and_restored(live, history):
     assert client.next_status().level == OK
     answer = client.trigger("restore_baseline")
     assert answer.success
-    assert answer.message == f"baseline: {OLD}; before: {NEW}"
+    assert answer.message == f"baseline: {OLD}; previous result: {NEW}"
     status = client.next_status()
     assert status.level == ERROR
     assert "excess friction" in status.message
@@ -269,17 +273,19 @@ def test_a_baseline_of_the_parameter_is_replaced_and_comes_back(live, history):
     client = live.client
     client.identified(HEALTHY)
     given = Baseline(140.0)
-    assert client.trigger("set_baseline").message == f"baseline: {OLD}; before: {given}{TAKEN}"
+    assert client.trigger("set_baseline").message == (
+        f"baseline: {OLD}; previous result: {given}{TAKEN}"
+    )
     assert client.set_together(NODE, {"baseline_coulomb_friction": 145.0}).successful
     refused = client.trigger("restore_baseline")
     assert not refused.success
     assert "is not in force any more: set baseline_coulomb_friction" in refused.message
     assert (
         client.trigger("set_baseline").message
-        == f"baseline: {OLD}; before: {Baseline(145.0)}{TAKEN}"
+        == f"baseline: {OLD}; previous result: {Baseline(145.0)}{TAKEN}"
     )
     answer = client.trigger("restore_baseline").message
-    assert answer == f"baseline: {Baseline(145.0)}; before: {OLD}"
+    assert answer == f"baseline: {Baseline(145.0)}; previous result: {OLD}"
     assert history.baseline(VALVE.name).baseline == Baseline(145.0)
 
 

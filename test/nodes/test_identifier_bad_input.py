@@ -107,15 +107,15 @@ BAD_INPUTS = {  # what is published, how many samples of it are taken, words of 
     "no position": (
         with_joints(name=["stem"]),
         999,
-        "without a position of the joint (1 samples)",
+        "has no position for the joint (1 samples)",
     ),
     "other joint": (
         with_joints(name=["arm"], position=[0.01]),
         999,
-        "without a position of the joint (1 samples)",
+        "has no position for the joint (1 samples)",
     ),
-    "position repeats": (repeated_position, 1000, "stem_state repeats a stamp (1 samples)"),
-    "no stamps": (no_stamps, 4, "actuator_pressure repeats a stamp (499 samples)"),
+    "position repeats": (repeated_position, 1000, "stem_state repeats a time stamp (1 samples)"),
+    "no stamps": (no_stamps, 4, "actuator_pressure repeats a time stamp (499 samples)"),
     "pressure too high": (bad_pressure(260e3), 999, *OUTSIDE),
     "apart in time": (apart, 1000, "do not overlap", "3.6e+03 s later"),
 }
@@ -186,7 +186,7 @@ def test_stamps_that_go_back_clear_the_buffer(client, signal):
     topic = {"pressure": "actuator_pressure", "stem": "stem_state"}[signal]
     reason = client.identify_all(0).message
     assert "no samples" in reason
-    assert f"the buffer was cleared: stamps of {topic} went back by 5.99 s" in reason
+    assert f"the buffer was cleared: stamps of {topic} returned by 5.99 s" in reason
     identifies_the_next_record(client)
 
 
@@ -200,7 +200,7 @@ def test_the_log_tells_a_clearing_right_after_a_bad_sample(live):
     client.wait_for_buffered(0)
     client.wait_until(
         lambda: (
-            "stamps of actuator_pressure went back by 0.01 s: the buffer was cleared"
+            "stamps of actuator_pressure returned by 0.01 s: the buffer was cleared"
             in process.errors
         ),
         "the warning",
@@ -253,4 +253,4 @@ def test_a_stamp_within_a_period_of_the_last_costs_its_sample_alone(client):
     client.send_stem(STAMPS[249] - 4_000_000, 1.0)
     send(client, slice(250, 500))
     assert client.identify_all(2 * len(RECORD)).success
-    assert "stem_state was overtaken on its way" in client.last_values()["samples_rejected causes"]
+    assert "stem_state arrived out of order" in client.last_values()["samples_rejected causes"]

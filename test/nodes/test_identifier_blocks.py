@@ -124,4 +124,4 @@ def test_the_stamps_are_those_of_the_topics(fed):
     client.wait_for_buffered(200)
     client.send_pressure(stamps_of(RECORD)[99], RECORD.pressure[99])
     client.send_stem(stamps_of(RECORD)[100], RECORD.position[100])
-    assert "actuator_pressure repeats a stamp (1 samples)" in client.identify_all(201).message
+    assert "actuator_pressure repeats a time stamp (1 samples)" in client.identify_all(201).message

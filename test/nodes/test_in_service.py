@@ -200,7 +200,7 @@ def test_it_adds_up_and_survives_a_kill(live, tmp_path):
 
     refused = client.trigger("set_baseline")
     assert not refused.success
-    assert "the moves in service are no baseline yet: 0 moves up and 0 down" in refused.message
+    assert "moves in service cannot be the baseline yet: 0 moves up and 0 down" in refused.message
     serve(client, 0, 300.0)
     values = client.status_values(
         lambda status: number(values_of(status), "sliding_friction [N]") > 0, "an estimate"
@@ -366,7 +366,7 @@ def test_moves_in_service(live, unit, scale):
     status = client.next_status(lambda one: one.level == WARN, "a late stem")
     assert values_of(status)["NE 107"] == "M"
     assert "after its command (median of 6 moves, limit 0.8 s)" in status.message
-    assert "the pressure itself responds late: check the positioner" in status.message
+    assert "the actuator pressure itself responds late: check the positioner" in status.message
 
 
 def test_the_figures_outlive_a_kill(live, tmp_path):

@@ -90,7 +90,7 @@ def test_a_clock_that_is_set_back_costs_no_later_move(tmp_path, ahead, restarts)
     bench.error = 0
     bench.serve(7)
     assert len(bench.ledger.moves) == 30
-    assert "before those that are kept" in bench.ledger.problem
+    assert "earlier than those stored" in bench.ledger.problem
     bench.serve(33)
     assert bench.ledger.problem == ""
     assert bench.ledger.left_out == 0

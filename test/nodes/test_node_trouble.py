@@ -34,7 +34,7 @@ def test_a_damaged_message_costs_only_itself(live, kind, topic):
     stranger = client.node.create_publisher(kind, f"{NAMESPACE}/{topic}", 10)
     client.wait_until(lambda: stranger.get_subscription_count() > 0, "the identifier")
     stranger.publish(DAMAGED)
-    told = "100 % of its samples are rejected, no sample has been usable yet: they are damaged"
+    told = "100 % of its samples are rejected, no usable sample yet: the messages are damaged"
     words = f"{topic}: {told}"
     client.wait_until(lambda: words in process.errors, "the warning")
     record = quick_record()

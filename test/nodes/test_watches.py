@@ -330,7 +330,7 @@ def test_commands_that_cannot_be_used(monkeypatch, parameters, value, ahead, sai
     bench.serve(35.0, value, ahead * SECOND)
     (finding,) = bench.watch.findings()
     assert (finding.level, finding.status_signal.value) == (1, "C")
-    assert finding.message.startswith("no command of stem_command can be used: ")
+    assert finding.message.startswith("no command on stem_command can be used: ")
     assert said in finding.message
     if not parameters:
         bench.serve(3.0)

@@ -210,9 +210,9 @@ class TestBadSamples:
         again = pressure_message(START + 9 * PERIOD, 1e5)
         bag = write_bag(tmp_path / "bag", with_pressure((10, again), (20, again[:4] + b"\0" * 40)))
         assert problem(bag) == (
-            ", /fv_101: bad samples: actuator_pressure repeats a stamp (1 samples): "
-            "use a stretch of the record without them; 1 messages of /fv_101/actuator_pressure "
-            "cannot be decoded as its type, and were left out"
+            ", /fv_101: bad samples: actuator_pressure repeats a time stamp (1 samples): use a "
+            "stretch of the record without them; 1 messages of /fv_101/actuator_pressure cannot "
+            "be decoded as its type, and were left out"
         )
 
     def test_not_finite(self, tmp_path):
@@ -237,7 +237,7 @@ class TestBadSamples:
         np.testing.assert_array_equal(valve.recording().position, record.position[1001:])
         (note,) = valve.notes
         assert note == (
-            "stamps of actuator_pressure went back by 2 s: what was recorded before that was left "
+            "stamps of actuator_pressure returned by 2 s: what was recorded before that was left "
             "out"
         )
 
@@ -610,7 +610,7 @@ class TestJoints:
 
     def test_ambiguous(self, tmp_path):
         assert problem(self.bag(tmp_path / "bag", "knob", "plug")) == (
-            ", /fv_101: /fv_101/stem_state: several joints (knob, plug): name the joint that is "
+            ", /fv_101: /fv_101/stem_state: several joints (knob, plug): specify which joint is "
             "the stem"
         )
 

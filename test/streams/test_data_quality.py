@@ -126,11 +126,11 @@ def test_its_sentence_has_the_cause_and_the_remedy(bench, name):
     words = {
         "nan pressure": ("actuator_pressure: 100 %", "not finite: check sensor"),
         "pressure too high": ("9e+05 Pa is outside the sensor's range", "pressure_maximum"),
-        "nan position": ("the last usable one came 2 s ago", "check sensor"),
+        "nan position": ("last usable sample 2 s ago", "check sensor"),
         "endless position": ("1e+308 m is outside the range of any valve", "unit (m)"),
-        "no joint": ("no position of the joint 'stem'", "set joint"),
-        "mm": ("as at 9 m", "read as m?"),
-        "below its stop": ("as at -0.01 m", "check unit (m), zero and travel"),
+        "no joint": ("no position for the joint 'stem'", "set joint"),
+        "mm": ("for example 9 m", "read as m?"),
+        "below its stop": ("for example -0.01 m", "check unit (m), zero and travel"),
         "late": ("stamped 5 s later", "synchronise"),
         "early": ("stamped 5 s earlier", "synchronise"),
         "ahead": ("of both inputs are 3e+08 s ahead", "synchronise"),
@@ -190,7 +190,7 @@ def test_damaged_messages():
     bench.quality.see(Arrivals.joined(()), intake, 0.0)
     (found,) = bench.faults()
     assert found == DataFault(REJECTED, Signal.POSITION, SampleFault.DAMAGED)
-    assert "no sample has been usable yet: they are damaged" in str(found.statement(BENCH_VALVE))
+    assert "no usable sample yet: the messages are damaged" in str(found.statement(BENCH_VALVE))
     assert sum(bench.buffer.rejected.values()) == 3
 
 

@@ -99,7 +99,7 @@ BAD = [
     ("pressure", math.nextafter(250000.0, math.inf), RANGE),
     ("position", math.nan, "stem_state is not finite"),
     ("position", -math.inf, "stem_state is not finite"),
-    ("position", None, "stem_state without a position of the joint"),
+    ("position", None, "stem_state has no position for the joint"),
 ]
 
 
@@ -139,14 +139,16 @@ class TestBadSamples:
 class TestRepeatedStamps:
     def test_the_first_stays(self, buffer):
         fill(buffer, 500)
-        assert str(buffer.add_pressure(stamp(499), 7.0)) == "actuator_pressure repeats a stamp"
-        assert str(buffer.add_position(stamp(499), 7.0)) == "stem_state repeats a stamp"
+        assert str(buffer.add_pressure(stamp(499), 7.0)) == (
+            "actuator_pressure repeats a time stamp"
+        )
+        assert str(buffer.add_position(stamp(499), 7.0)) == "stem_state repeats a time stamp"
         snapshot = buffer.snapshot()
         assert snapshot.pressure.values[-1] == 1e5 + 499
         assert snapshot.position.values[-1] == 1e-6 * 499
         message = refused(buffer)
-        assert "actuator_pressure repeats a stamp (1 samples)" in message
-        assert "stem_state repeats a stamp (1 samples)" in message
+        assert "actuator_pressure repeats a time stamp (1 samples)" in message
+        assert "stem_state repeats a time stamp (1 samples)" in message
 
 
 class TestStampsThatGoBack:
@@ -155,7 +157,7 @@ class TestStampsThatGoBack:
         fill(buffer, 500)
         buffer.add_pressure(stamp(500), math.nan)
         name = {"pressure": "actuator_pressure", "position": "stem_state"}[signal]
-        cause = f"stamps of {name} went back by 0.25 s"
+        cause = f"the time stamps of {name} returned by 0.25 s"
         found = getattr(buffer, f"add_{signal}")(stamp(249), 1e-3)
         assert str(found) == cause + ": the buffer was cleared"
         assert len(buffer) == 0
@@ -186,7 +188,7 @@ class TestStampsThatWereOvertaken:
     @pytest.mark.parametrize("back", [1, 2, 4])
     def test_one_is_left_out_and_the_window_is_a_recording(self, buffer, signal, back):
         name = {"pressure": "actuator_pressure", "position": "stem_state"}[signal]
-        cause = f"{name} was overtaken on its way: its stamp is a little before the last one"
+        cause = f"{name} arrived out of order: its time stamp is slightly before the last one"
         last = 199 * self.PERIOD
         assert str(getattr(buffer, f"add_{signal}")(stamp(last - back), 7.0)) == cause
         fill(buffer, 10, first=last + self.PERIOD, period=self.PERIOD)
@@ -199,7 +201,7 @@ class TestStampsThatWereOvertaken:
 
     def test_further_back_the_clock_has_jumped(self, buffer):
         found = buffer.add_pressure(stamp(199 * self.PERIOD - 7), 1e5)
-        assert str(found).endswith("went back by 0.007 s: the buffer was cleared")
+        assert str(found).endswith("returned by 0.007 s: the buffer was cleared")
 
     def test_a_block_without_them_is_what_the_watches_take(self, buffer):
         at = 200 * self.PERIOD + np.array([0, 4, 2, 8, 12, 11, 16])
@@ -260,9 +262,9 @@ def test_each_sample_is_counted_as_taken_or_by_the_cause_of_its_rejection(buffer
     assert buffer.taken == 5000 + 3
     assert {str(one): number for one, number in buffer.rejected.items()} == {
         RANGE: 2,
-        "actuator_pressure went back in time": 1,
+        "actuator_pressure returned in time": 1,
         "actuator_pressure is not finite": 1,
-        "stem_state repeats a stamp": 1,
+        "stem_state repeats a time stamp": 1,
     }
 
 

@@ -523,7 +523,7 @@ class TestTooLittle:
     @pytest.mark.parametrize(("missing", "name"), [(0, "actuator_pressure"), (1, "stem_state")])
     def test_nothing_and_one(self, missing, name):
         for count, message in (
-            (0, f"no samples of {name}: check that it is published, and on this topic"),
+            (0, f"no samples of {name}: check that it is published on this topic"),
             (1, f"only one sample of {name}: check that it is sampled continuously"),
         ):
             signals = [signal(every(1, 30), pressure), signal(every(1, 30), position)]

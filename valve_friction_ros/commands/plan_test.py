@@ -178,9 +178,9 @@ def print_plan(plan: StrokePlan, path: Path) -> None:
     table.add_row("top speed [mm/s]", *(f"{one.top_speed * 1e3:.2g}" for one in plan.forecasts))
     console.print(table)
     console.print(
-        "On simulated valves of other physics the reported intervals were 1.5 to 1.8 times as wide "
-        "(median), and that of F_c up to 16 times where friction varies along the travel or "
-        "gradually with speed."
+        "On simulated valves of other physics the reported intervals were 1.5 to 1.8 times as "
+        "wide (median), and that of F_c up to 16 times where friction that varies along the "
+        "travel or gradually with speed."
     )
     for remark in plan_remarks(plan):
         console.print(f"note: {remark}")

@@ -261,8 +261,8 @@ _MAX_SPRING_REL_HALF_WIDTH = 0.25
 Chosen: moves over some tenths of the travel know it to ±4 %, moves that hardly leave their place to
 ±50 %; friction that bends with the speed then moves the dead band by 10 %."""
 
-_MEAN_SLOPE = "the change of friction with speed among moves, by whatever law"
-_COULOMB = "moves in service do not split friction into F_c and F_v"
+_MEAN_SLOPE = "the change of friction with speed across the moves, whatever its law"
+_COULOMB = "moves in service do not separate friction into F_c and F_v"
 
 
 @dataclass(frozen=True)
@@ -409,7 +409,7 @@ def _too_few(moves: Moves, has_changed: bool) -> str:
     since = " since friction changed" if has_changed else ""
     return (
         f"{up} moves up and {down} down in {blocks} blocks of time{since}: {FEWEST_MOVES} of each "
-        f"in {FEWEST_BLOCKS} blocks are needed; let the valve work on"
+        f"in {FEWEST_BLOCKS} blocks are needed; leave the valve in service"
     )
 
 
@@ -453,7 +453,7 @@ def _parameters(balance: Balance, spring: float | None) -> dict[str, Parameter]:
     if spring is not None:
         found["spring_constant"] = fixed("spring_constant", spring)
     if balance.onsets < FEWEST_MOVES:
-        reason = f"{balance.onsets} breakaways from a rest: {FEWEST_MOVES} are needed"
+        reason = f"{balance.onsets} breakaways from rest: {FEWEST_MOVES} are needed"
         for name in ("static_friction", "dead_band"):
             found[name] = not_identifiable(name, reason)
     spread = balance.number(along(spring=1.0))[1] / k if k > 0 else math.inf
@@ -467,8 +467,8 @@ def _vague_spring(spring: float, share: float) -> str:
     if not spring > 0:
         return "the valve shows no spring"
     return (
-        f"it is friction over spring, and moves that hardly leave their place know the spring to "
-        f"±{percentage(share)} only: let the set point go to other places, or state "
+        "it is friction over spring constant, and moves around one position determine the spring "
+        f"constant only to ±{percentage(share)}: move the set point over a wider range, or set "
         "fixed.spring_constant if it is known"
     )
 
@@ -480,9 +480,9 @@ def _doubt(balance: Balance, value: float, slope: NDArray[np.float64]) -> str:
     if width <= WEAK_SHARE * abs(value) or 2.0 * lag**2 < width**2:
         return ""
     return (
-        f"its interval is ±{percentage(width / abs(value))} of its value, most of it by the lag "
-        f"between the signals: state a timing_uncertainty below {balance.timing:g} s if their "
-        "clocks and lags are known"
+        f"its interval is ±{percentage(width / abs(value))} of its value, mostly due to the lag "
+        f"between the signals: set timing_uncertainty below {balance.timing:g} s if their clocks "
+        "and lags are known"
     )
 
 

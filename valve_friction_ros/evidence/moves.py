@@ -78,7 +78,7 @@ class Move:
     def __post_init__(self) -> None:
         """Refuse what is no move."""
         if not self.begin < self.end:
-            raise ValueError(f"a move must end after its begin, got {self.begin} to {self.end} ns")
+            raise ValueError(f"a move must end after it begins, got {self.begin} to {self.end} ns")
         for name in ("start", "stop", "force", "force_rate"):
             require_finite(name, getattr(self, name))
         require_positive("distance", self.distance)
@@ -170,9 +170,9 @@ def stamp_problem(move: Move, last: int | None, now: int) -> str:
         The node's clock, ns since 1970 (UTC).
     """
     if last is not None and move.begin < last:
-        return "before those that are kept"
+        return "earlier than those stored"
     if now > _CLOCK_IS_SET and move.end > max(now, last or 0) + DAY:
-        return "more than a day ahead of the clock, and of those that are kept"
+        return "more than a day ahead of the clock and of those stored"
     return ""
 
 

@@ -29,10 +29,10 @@ grown, with the other one that has doubled: ln(1.5/1.25)/√2 and ln(2/1.25)/√
 
 
 _MORE = (
-    "record more strokes, some fast and some slow, and state a timing_uncertainty if the clocks "
-    "and lags of both signals are known"
+    "record more strokes, some fast and some slow, and set timing_uncertainty if the clocks and "
+    "lags of both signals are known"
 )
-_OTHER_METHOD = "identify by a method that gives intervals"
+_OTHER_METHOD = "use a method that gives confidence intervals"
 
 
 class Lack(Enum):

@@ -60,7 +60,7 @@ def baseline_by_evidence(evidence: Evidence) -> Baseline:
     if lack is None:
         return Baseline(sliding=SlidingFriction(one.value, one.half_width, evidence.sliding_speed))
     if lack.lack is Lack.VALUE:
-        message = f"the moves in service are no baseline yet: {one.reason}"
+        message = f"moves in service cannot be the baseline yet: {one.reason}"
     elif lack.lack is Lack.SIZE:
         message = (
             f"a sliding friction of {one.value:.4g} N cannot be a baseline: check the direction of "
@@ -68,9 +68,9 @@ def baseline_by_evidence(evidence: Evidence) -> Baseline:
         )
     else:
         message = (
-            f"the moves in service are no baseline yet: sliding friction is known to "
-            f"±{percentage(one.half_width / one.value)}, and a baseline needs "
-            f"±{percentage(GOOD_SHARE)}: let the valve work on, and state a timing_uncertainty "
+            "moves in service cannot be the baseline yet: sliding friction is known to "
+            f"±{percentage(one.half_width / one.value)}, but a baseline requires "
+            f"±{percentage(GOOD_SHARE)}: leave the valve in service, and set timing_uncertainty "
             "if the clocks and lags of both signals are known"
         )
     raise BaselineRefusalError(message, lack)

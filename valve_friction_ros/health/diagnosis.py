@@ -76,9 +76,9 @@ class FrictionLimits:
         """Refuse limits that are out of order."""
         if not 0 < self.low_ratio < 1 < self.warn_ratio < self.error_ratio:
             raise ValueError(
-                "limits must obey 0 < low_ratio < 1 < warn_ratio < error_ratio, got "
-                f"low_ratio {self.low_ratio:g}, warn_ratio {self.warn_ratio:g}, "
-                f"error_ratio {self.error_ratio:g}"
+                "limits must satisfy 0 < low_ratio < 1 < warn_ratio < error_ratio, got low_ratio "
+                f"{self.low_ratio:g}, warn_ratio {self.warn_ratio:g}, error_ratio "
+                f"{self.error_ratio:g}"
             )
 
     @property

@@ -208,7 +208,7 @@ def identify_snapshot(snapshot: Snapshot, settings: MonitorSettings) -> Result:
 
 def _of_means(result: Result, count: int) -> Result:
     """Return a result whose evidence says of how many samples its record has means."""
-    told = f"the record is of means of {count} samples that follow each other"
+    told = f"the record consists of averages of {count} successive samples"
     return replace(
         result,
         evidence={**result.evidence, "averaged_samples": count},

@@ -69,8 +69,8 @@ class SurveyLimits:
         """Refuse limits that are out of order."""
         if not 0 < self.watch < self.bad:
             raise ValueError(
-                "limits must obey 0 < survey_watch < survey_bad, got "
-                f"survey_watch {self.watch:g}, survey_bad {self.bad:g}"
+                "limits must satisfy 0 < survey_watch < survey_bad, got survey_watch "
+                f"{self.watch:g}, survey_bad {self.bad:g}"
             )
 
 

@@ -83,7 +83,7 @@ class ValveLimits:
                 raise ValueError(f"{name} must be above {least:g}, got {value:g}")
         if not self.spring_change < self.spring_failure < 1:
             raise ValueError(
-                "limits must obey spring_change < spring_failure < 1, got spring_change "
+                "limits must satisfy spring_change < spring_failure < 1, got spring_change "
                 f"{self.spring_change:g}, spring_failure {self.spring_failure:g}"
             )
 

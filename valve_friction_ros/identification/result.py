@@ -235,7 +235,8 @@ class Result:
         found: Any = self.evidence.get(CORRELATION)
         if found is None:
             raise RefusalError(
-                f"the method {self.method} tells no correlation: use the method plant or bench"
+                f"the method {self.method} does not give a correlation: use the method plant or "
+                "bench"
             )
         return pd.DataFrame(found["matrix"], found["names"], found["names"])
 
@@ -299,12 +300,16 @@ class Result:
         """
         mine, others = self.stem, other.stem
         if mine is None or others is None:
-            raise RefusalError("a model without a simulated stem cannot be compared: use bench")
+            raise RefusalError(
+                "a model without a simulated stem cannot be compared: use the method bench"
+            )
         if self.recording is not other.recording and not (
             np.array_equal(self.recording.position, other.recording.position)
             and np.array_equal(self.recording.drive, other.recording.drive)
         ):
-            raise ValueError("the two results are of different records: compare models of one")
+            raise ValueError(
+                "the two results come from different records: compare models of the same record"
+            )
         begin = max(mine.start, others.start)
         end = min(float(mine.time[-1]), float(others.time[-1]))
         grid = np.arange(begin, end, self.recording.sample_period)
@@ -387,8 +392,8 @@ class Result:
         """Return the model to simulate; raises RefusalError if the record determined none."""
         if self.model is None:
             raise RefusalError(
-                "the record did not determine a model to simulate: identify another one, or fix "
-                "what it leaves open"
+                "the record did not determine a model to simulate: identify another record, or "
+                "fix the parameters that are missing"
             )
         return self.model
 

@@ -196,7 +196,7 @@ def _checked(values: Mapping[str, float], names: tuple[str, ...], what: str) -> 
     for name, value in values.items():
         if name not in names:
             raise ValueError(
-                f"{name!r} is not a parameter that can be {what}; choose from {', '.join(names)}"
+                f"{name!r} is not a parameter that can be {what}: choose from {', '.join(names)}"
             )
         if name in _MAY_BE_NEGATIVE:
             checked[name] = require_finite(name, value)

@@ -166,7 +166,7 @@ class Recording:
     def pressure(self) -> NDArray[np.float64]:
         """Actuator pressure, Pa, shape (n,); raises ValueError where a force drives the stem."""
         if self.driven_by is not Drive.PRESSURE:
-            raise ValueError("the recording holds a force and no pressure: use its drive, in N")
+            raise ValueError("the recording holds a force, not a pressure: use its drive, in N")
         return self.drive
 
     @property

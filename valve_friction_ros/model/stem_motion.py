@@ -143,7 +143,7 @@ def _time_to_rest(
             return math.inf
         early, early_velocity = late, end.velocity
         late = min(late + half_period, duration)
-    raise ArithmeticError("the stem turns a million times within a sample: sample faster")
+    raise ArithmeticError("the stem reverses a million times within one sample: sample faster")
 
 
 @compiled
@@ -231,7 +231,7 @@ def _slide_one_way(
         if final == 0.0 or strays <= 1.5 * allowed or step < 1e-9 * duration:
             return reached, final, time, local
         step *= max(allowed / strays, 0.01)
-    raise ArithmeticError("the falling friction has no chord that is short enough")
+    raise ArithmeticError("no chord of the falling friction is short enough")
 
 
 @compiled
@@ -357,4 +357,6 @@ def advance_stem(
             )
         position, velocity = side * reached, side * speed
         elapsed += max(time, shortest_phase)
-    raise ArithmeticError("the stem starts or stops a million times within a sample: sample faster")
+    raise ArithmeticError(
+        "the stem starts or stops a million times within one sample: sample faster"
+    )

@@ -76,8 +76,8 @@ class Limits:
             <= 1
         ):
             raise ValueError(
-                f"the part of the travel must rise within 0 to 100 %, got {100 * self.lowest:g} % "
-                f"to {100 * self.highest:g} %"
+                "the part of the travel must be given from low to high within 0 to 100 %, got "
+                f"{100 * self.lowest:g} % to {100 * self.highest:g} %"
             )
         require_positive("speed", self.speed)
         require_positive("duration", self.duration)

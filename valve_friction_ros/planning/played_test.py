@@ -79,7 +79,7 @@ class PlayLimits:
             if not -math.inf < low < high < math.inf:
                 raise ValueError(
                     f"the limits of the {name} must be two numbers in order, got {low:g} and "
-                    f"{high:g}: give those at which the test has to end"
+                    f"{high:g}: give the limits at which the test must abort"
                 )
         for name in ("silence", "duration"):
             if not 0 < getattr(self, name) < math.inf:
@@ -115,8 +115,8 @@ class PlayedTest:
         self._pending: Abort | None = None
         if self.duration > limits.duration:
             raise ValueError(
-                f"the test takes {self.duration:g} s, and {limits.duration:g} s are allowed: plan "
-                "a shorter one, or allow it"
+                f"the test takes {self.duration:g} s, but only {limits.duration:g} s are allowed: "
+                "plan a shorter test, or allow more time"
             )
 
     aborted: Abort | None
@@ -172,10 +172,10 @@ class PlayedTest:
         Raises RefusalError if it plays already, or the signals do not come or lie beyond limits.
         """
         if self.phase is PlayPhase.PLAYING:
-            raise RefusalError("the test is being played: stop it first")
+            raise RefusalError("the test is running: stop it first")
         doubt = self._doubt(now)
         if doubt is not None:
-            raise RefusalError(f"nothing is set: {self._words(doubt)}")
+            raise RefusalError(f"no pressure is set: {self._words(doubt)}")
         self.phase, self.aborted, self._pending = PlayPhase.PLAYING, None, None
         self._begun = self._stepped = now
 
@@ -209,9 +209,9 @@ class PlayedTest:
     def __str__(self) -> str:
         """Return where it stands, on one line."""
         if self.phase is PlayPhase.BACK and self.aborted is not None:
-            return f"went back to {self.home / 1e3:.4g} kPa: {self._words(self.aborted)}"
+            return f"returned to {self.home / 1e3:.4g} kPa: {self._words(self.aborted)}"
         return {
-            PlayPhase.WAITING: "waits to be started",
+            PlayPhase.WAITING: "waiting for start",
             PlayPhase.PLAYING: f"plays for {self.duration:.4g} s",
-            PlayPhase.ENDED: "played to its end",
-        }.get(self.phase, "went back")
+            PlayPhase.ENDED: "completed",
+        }.get(self.phase, "returned")

@@ -254,7 +254,7 @@ class _Search:
         aim: str,
     ) -> None:
         if aim not in AIMS:
-            raise ValueError(f"there is no aim {aim!r}: choose from {', '.join(AIMS)}")
+            raise ValueError(f"unknown aim {aim!r}: choose from {', '.join(AIMS)}")
         self.valve, self.frictions, self.limits = valve, frictions, limits
         self.conditions, self.settings, self.names = conditions, settings, AIMS[aim]
         self.band = pressure_band(valve, frictions, limits)
@@ -311,9 +311,9 @@ class _Search:
         if not fitting:
             span = (self.band.high - self.band.low) / self.band.rate
             raise RefusalError(
-                f"{self.limits.duration:g} s have no room for two strokes up and down, of "
-                f"{span:.3g} s each at {self.band.rate / 1e3:.3g} kPa/s: allow more time, a "
-                "higher speed or rate, or a smaller part of the travel"
+                f"{self.limits.duration:g} s do not allow two strokes up and down of {span:.3g} s "
+                f"each at {self.band.rate / 1e3:.3g} kPa/s: allow more time, a higher speed or "
+                "rate, or a smaller part of the travel"
             )
         return fitting
 
@@ -425,7 +425,9 @@ def plan_test(
         len({pattern for pattern, _ in found.known}),
     )
     if plan.likely.refusal:
-        raise RefusalError(f"no test within these limits tells the friction: {plan.likely.refusal}")
+        raise RefusalError(
+            f"no test within these limits determines friction: {plan.likely.refusal}"
+        )
     return plan
 
 
@@ -444,11 +446,12 @@ def _resting(plan: StrokePlan) -> Iterator[str]:
     ):
         if stroke(plan.valve, draw, plan.band) < LEAST_STROKE * plan.valve.travel:
             yield (
-                f"a friction {name} (F_s {draw.static_friction:.4g} N) may hold the stem: if it "
-                "does not move, friction has grown at least so far; widen its part of the travel"
+                f"a friction {name} (F_s {draw.static_friction:.4g} N) may hold the stem: if the "
+                "stem does not move, friction has grown at least to this value; widen the part of "
+                "the travel"
             )
         elif one.refusal:
-            yield f"friction {name}: the identification would refuse the record: {one.refusal}"
+            yield f"friction {name}: identification would refuse the record: {one.refusal}"
 
 
 def _reaches(plan: StrokePlan) -> Iterator[str]:
@@ -456,25 +459,27 @@ def _reaches(plan: StrokePlan) -> Iterator[str]:
     valve, limits = plan.valve, plan.limits
     if plan.band.low <= lowest_pressure(valve):
         yield (
-            f"the lower end is the atmosphere, {plan.band.low / 1e3:.4g} kPa (pressure_reference): "
-            "the stem may not reach the lower end of its part of the travel"
+            f"the lower end is atmospheric pressure, {plan.band.low / 1e3:.4g} kPa "
+            "(pressure_reference): the stem may not reach the lower end of the part of the travel"
         )
     low, high = frictionless_reach(valve, plan.frictions, plan.band)
     if low < limits.lowest * valve.travel or high > limits.highest * valve.travel:
         yield (
-            f"with less friction than was assumed the stem goes further, at most from "
+            "with less friction than assumed the stem moves further, at most from "
             f"{100 * max(low, 0.0) / valve.travel:.0f} to "
             f"{100 * min(high, valve.travel) / valve.travel:.0f} % of the travel"
         )
     if low <= 0 or high >= valve.travel:
-        yield "the stem may reach seat or stop: there its pressure tells nothing of friction"
+        yield (
+            "the stem may reach the seat or stop, where the pressure gives no information on "
+            "friction"
+        )
     lowest = min(one.reach[0] for one in plan.forecasts)
     highest = max(one.reach[1] for one in plan.forecasts)
     over = max(limits.lowest * valve.travel - lowest, highest - limits.highest * valve.travel)
     if over > _OVERTRAVEL * valve.travel:
         yield (
-            f"after a breakaway the stem may overshoot its part of the travel by "
-            f"{over * 1e3:.2g} mm"
+            f"after breakaway the stem may overshoot the part of the travel by {over * 1e3:.2g} mm"
         )
 
 
@@ -482,13 +487,13 @@ def _speeds(plan: StrokePlan) -> Iterator[str]:
     fastest = max(one.top_speed for one in plan.forecasts)
     if fastest > _FASTER_RATIO * plan.limits.speed:
         yield (
-            f"as it breaks away the stem may jump, at up to {fastest * 1e3:.2g} mm/s, whatever the "
+            f"at breakaway the stem may jump at up to {fastest * 1e3:.2g} mm/s, whatever the "
             "pressure does"
         )
     if plan.likely.top_speed < FALL_SPEED:
         yield (
-            f"the stem moves at {plan.likely.top_speed * 1e3:.2g} mm/s at most: what friction is "
-            f"above that, up to {FALL_SPEED * 1e3:.2g} mm/s, remains unknown; allow more speed or "
+            f"the stem moves at {plan.likely.top_speed * 1e3:.2g} mm/s at most: friction above "
+            f"that speed, up to {FALL_SPEED * 1e3:.2g} mm/s, remains unknown; allow more speed or "
             "travel"
         )
 
@@ -501,7 +506,9 @@ def _unknown_parameters(plan: StrokePlan) -> Iterator[str]:
         why = f"is known to ±{percentage(share)} only" if math.isfinite(share) else "stays unknown"
         remedy = "allow more time, speed or travel"
         if name == "viscous_friction":
-            remedy = "its delay F_v/k cannot be told from a lag of the signals: state a smaller "
+            remedy = (
+                "its delay F_v/k cannot be distinguished from a lag of the signals: set a smaller "
+            )
             remedy += "timing_uncertainty if the clocks allow it"
         yield f"{name} {why}: {remedy}"
 

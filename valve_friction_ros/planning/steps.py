@@ -105,12 +105,12 @@ class SetPoint:
 def _tells(before: float, now: float, after: float, largest: float) -> str:
     """Say what a step is for; the arguments are rates, Pa/s."""
     if now == 0:
-        return "rest: the next start tells whether static friction exceeds Coulomb friction"
-    words = ["reversal: Coulomb friction, the dead band"] if before * now < 0 else []
+        return "rest: the next start shows whether static friction exceeds Coulomb friction"
+    words = ["reversal: Coulomb friction, dead band"] if before * now < 0 else []
     if abs(now) >= _QUICK * largest:
-        words.append("quick: viscous friction, with the slow strokes")
+        words.append("fast: viscous friction, together with the slow strokes")
     if not words:
-        words.append("the spring, and Coulomb friction in one direction")
+        words.append("spring, and Coulomb friction in one direction")
     if before == 0 and after == before:
         words.append("start from rest: static friction")
     return "; ".join(words)
@@ -137,7 +137,9 @@ def set_points(
     """
     low, high = signal or signal_range(plan.valve, plan.frictions)
     if not low < high:
-        raise ValueError(f"the signal's range must rise, got {low:g} to {high:g} Pa")
+        raise ValueError(
+            f"the range of the signal must be given from low to high, got {low:g} to {high:g} Pa"
+        )
     travel, test = plan.valve.travel, plan.test
     reaches = [one.reach for one in plan.forecasts]
     stem = (
@@ -167,8 +169,8 @@ def set_points(
         moving = rate or moving
     if any(not 0 <= round(one.share, 6) <= 1 for one in steps):
         raise ValueError(
-            f"the test needs {plan.band.low / 1e5:.4g} to {plan.band.high / 1e5:.4g} bar, and the "
-            f"signal has {low / 1e5:.4g} to {high / 1e5:.4g}: give the converter's range "
+            f"the test needs {plan.band.low / 1e5:.4g} to {plan.band.high / 1e5:.4g} bar, but the "
+            f"signal covers {low / 1e5:.4g} to {high / 1e5:.4g}: give the converter's range "
             "(--signal-range '0.2..1.0 bar')"
         )
     return tuple(steps)

@@ -60,10 +60,10 @@ class FrictionRange:
     def __post_init__(self) -> None:
         """Refuse an empty range, and valves without a spring or with several."""
         if not self.draws or len(self.draws) != len(self.names):
-            raise ValueError(f"{len(self.draws)} valves with {len(self.names)} names")
+            raise ValueError(f"{len(self.draws)} valves for {len(self.names)} names")
         springs = {(one.spring_constant, one.spring_preload) for one in self.draws}
         if len(springs) != 1 or not self.draws[0].spring_constant > 0:
-            raise ValueError("a stroke test needs one spring: give spring_constant above zero")
+            raise ValueError("a stroke test needs a spring: give spring_constant above zero")
 
     @property
     def middle(self) -> int:
@@ -246,7 +246,7 @@ def pressure_band(valve: Valve, frictions: FrictionRange, limits: Limits) -> Pre
     )
     if pressures.low >= pressures.high:
         raise RefusalError(
-            f"the pressure limits leave no band: the stem needs {low / 1e3:.4g} to "
+            f"the pressure limits leave no usable band: the stem needs {low / 1e3:.4g} to "
             f"{high / 1e3:.4g} kPa between {100 * limits.lowest:g} and {100 * limits.highest:g} % "
             f"of the travel, and {_lowest(valve, limits) / 1e3:.4g} kPa to "
             f"{_highest(valve, limits)} may be set: widen the range of the pressure (the "
@@ -290,9 +290,9 @@ def _require_strokes(
     if band.low > wanted[0] or band.high < wanted[1]:
         remedy += " or the range of the pressure"
     raise RefusalError(
-        f"a reversal would not move the stem {where}: a friction of "
-        f"{likely.static_friction:.4g} N needs {needed / 1e3:.4g} kPa to move the stem both "
-        f"ways, and there are {(band.high - band.low) / 1e3:.4g}: {remedy}"
+        f"a reversal would not move the stem {where}: a friction of {likely.static_friction:.4g} "
+        f"N needs {needed / 1e3:.4g} kPa to move the stem both ways, but the band spans "
+        f"{(band.high - band.low) / 1e3:.4g} kPa: {remedy}"
     )
 
 

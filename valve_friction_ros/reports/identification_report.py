@@ -68,11 +68,11 @@ _FRICTION = "Friction against its baseline"
 _WHOLE_VALVE = "The valve beside its friction"
 _NOTHING_ELSE = "Nothing else has surely changed beyond its limit"
 _BUDGET = (
-    "Where the intervals come from. By the record: its noise, what the model leaves of the motion, "
-    "and the imperfections of the valve. By the timing: a lag between the signals. By the "
-    "calibration: the scales of diaphragm area and sensors. By other models: what is left of the "
-    "interval, for laws of friction that are nearly as probable, or for what a law may leave out. "
-    "The 95 % interval is twice the root of the sum of the squares of a row."
+    "Sources of the interval widths. From record: noise, motion that the model does not explain, "
+    "and imperfections of the valve. From timing: lag between the signals. From calibration: "
+    "scales of diaphragm area and sensors. From other models: the remainder, for laws of friction "
+    "that are nearly as probable and for effects that a law may omit. The 95 % interval is twice "
+    "the root of the sum of the squares of a row."
 )
 _ALL_NOISE = 0.05
 """Share of a misfit, below which what is not noise is not told. Chosen: 0.1 % of its square."""

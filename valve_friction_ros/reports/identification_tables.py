@@ -116,9 +116,9 @@ def budget_table(record: IdentifiedRecord) -> PageTable | None:
         for name, one in budget.items()
         if _is_estimated(parameters[name])
     }
-    headings = [f"by the {source}" for source in sources]
+    headings = [f"from {source}" for source in sources]
     if any(values[-1] for values in parts.values()):
-        headings.append("by other models")
+        headings.append("from other models")
     columns = (Column("standard uncertainty"), *(Column(one, is_number=True) for one in headings))
     rows = (
         (_heading(name, parameters[name]), *map(two_digits, values[: len(headings)]))

@@ -283,7 +283,7 @@ def diagnosis_sentence(record: IdentifiedRecord) -> str:
         )
     elif friction.value < 0:
         finding = _Finding(
-            f"the identified friction is {friction.value:.4g} N, and friction is above zero",
+            f"the identified friction is {friction.value:.4g} N, but friction cannot be negative",
             "check the direction of both signals and identify it again",
         )
     else:

@@ -309,7 +309,7 @@ class ResponseLimits:
     def __post_init__(self) -> None:
         """Refuse limits below zero."""
         if min(self.deviation, self.dead_time, self.t86) < 0:
-            raise ValueError("limits of the response must not be below zero")
+            raise ValueError("limits of the response must not be negative")
 
 
 @dataclass(frozen=True)

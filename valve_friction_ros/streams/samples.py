@@ -413,9 +413,7 @@ def _gap(name: str, samples: Samples, period: int) -> Gap | None:
 def _period(name: str, samples: Samples) -> int:
     """Return the median sampling period in ns; refuse a signal that is empty."""
     if samples.stamps.size == 0:
-        raise LittleMotionError(
-            f"no samples of {name}: check that it is published, and on this topic"
-        )
+        raise LittleMotionError(f"no samples of {name}: check that it is published on this topic")
     if samples.stamps.size == 1:
         raise LittleMotionError(f"only one sample of {name}: check that it is sampled continuously")
     return int(np.median(np.diff(samples.stamps)))
@@ -554,4 +552,4 @@ def only_joint(names: Sequence[str]) -> str:
         return "".join(names)
     if DEFAULT_JOINT in names:
         return DEFAULT_JOINT
-    raise ValueError(f"several joints ({', '.join(names)}): name the joint that is the stem")
+    raise ValueError(f"several joints ({', '.join(names)}): specify which joint is the stem")

@@ -325,7 +325,9 @@ def test_every_source_has_words():
     for name in (*ABSENT, "start_position"):
         doubt = main_doubt(Budget(1.0, 0.0, {name: 2.0}), interval_share(1.0, 0.2))
         assert doubt.startswith("its interval is ±20 % of its value: the record does not determine")
-    assert main_doubt(Budget(1.0, 0.0, {"drift": 0.1}), 0.2).endswith("leaves of the motion")
+    assert main_doubt(Budget(1.0, 0.0, {"drift": 0.1}), 0.2).endswith(
+        "motion that the model does not explain"
+    )
 
 
 def ended(misfit, penalty, inflation, low_speed=(0.0, 1.0)):
@@ -465,5 +467,5 @@ def test_a_long_record_gives_the_right_friction(seed):
     truth = LOW_FRICTION.coulomb_friction + LOW_FRICTION.viscous_friction * result.sliding_speed
     assert abs(friction.value - truth) < friction.half_width
     assert friction.half_width < 0.1 * truth
-    assert any("the stem travels furthest were used" in text for text in result.findings)
+    assert any("with the most stem travel" in text for text in result.findings)
     assert result.stem.time[-1] <= 2400

@@ -231,7 +231,7 @@ class TestRefusals:
         pressure = converter_response(np.repeat(levels, [2000, 8000]), 1e-3)
         position = simulate(BENCH_VALVE, LOW_FRICTION, pressure, 1e-3).position
         message = self.refused(Recording(1e-3, pressure, position))
-        assert message.startswith(f"the stem moved {way} only")
+        assert message.startswith(f"the stem moved only {way}")
         assert "friction and spring cannot be separated" in message
 
     @pytest.mark.parametrize(("levels", "way"), [((6e4, 1.6e5), "up"), ((1.6e5, 6e4), "down")])
@@ -240,7 +240,7 @@ class TestRefusals:
         pressure = converter_response(np.repeat(levels, [2000, 8000]), 1e-3)
         position = simulate(BENCH_VALVE, LOW_FRICTION, pressure, 1e-3).position
         message = self.refused(NOISE.applied_to(Recording(1e-3, pressure, position)))
-        assert message.startswith(f"the stem moved {way} only")
+        assert message.startswith(f"the stem moved only {way}")
 
     @pytest.mark.parametrize("left", [4 * 301 - 1, 4 * 301])
     def test_too_few_moving_samples(self, bench_record, left):
@@ -253,7 +253,7 @@ class TestRefusals:
         )
         if left < 4 * 301:
             message = self.refused(record, settings)
-            assert message.startswith("no threshold leaves enough moving samples")
+            assert message.startswith("no threshold leaves enough samples in motion")
             assert "4 parameters" in message
         else:
             assert published_estimate(record, BENCH_VALVE, settings).samples == left

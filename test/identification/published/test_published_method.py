@@ -233,7 +233,7 @@ class TestStaticFriction:
         value, (warning,) = static_friction()
         assert value == 3.0
         assert warning == (
-            "the record shows no breakaway from rest: static_friction is set to coulomb_friction"
+            "the record contains no breakaway from rest: static_friction is set to coulomb_friction"
         )
 
 
@@ -359,8 +359,8 @@ def test_refuses_where_no_step_has_enough_samples(bench_record):
     with pytest.raises(RefusalError) as refusal:
         choose_threshold(sweep, longer)
     assert str(refusal.value) == (
-        "no threshold leaves enough moving samples to determine 5 parameters: "
-        "record more strokes, or fix a parameter"
+        "no threshold leaves enough samples in motion to determine 5 parameters: record more "
+        "strokes, or fix a parameter"
     )
     choose_threshold(sweep, longer - 1)
 

@@ -177,8 +177,8 @@ class TestRefusals:
         with pytest.raises(RefusalError) as refusal:
             identify_signature(record, BENCH_VALVE)
         message = str(refusal.value)
-        assert "does not slide at a constant speed" in message
-        assert "slow triangular wave of pressure, such as 60 s a period" in message
+        assert "needs a stem that slides at a constant speed" in message
+        assert "slow triangular pressure wave, such as a period of 60 s" in message
 
     @pytest.mark.parametrize(
         ("period", "duration", "cause"),
@@ -190,7 +190,7 @@ class TestRefusals:
     )
     def test_too_few_strokes(self, bench_record, period, duration, cause, noise):
         record = bench_record("high", TriangleWave(period=period), duration, noise)
-        with pytest.raises(RefusalError, match=f"{cause}: excite the valve by a slow triangular"):
+        with pytest.raises(RefusalError, match=f"{cause}: drive the valve with a slow triangular"):
             identify_signature(record, BENCH_VALVE)
 
     def test_a_record_that_begins_in_a_stroke_is_served(self, bench_record, noise):
@@ -223,7 +223,7 @@ class TestContradictions:
         [
             (
                 {"spring_constant": 1500.0},
-                "a static friction of -.* N, and friction is above zero",
+                "a negative static friction, -.* N: check",
             ),
             ({"spring_preload": 9000.0}, "does not reproduce the record"),
         ],

@@ -161,7 +161,7 @@ class TestSteps:
 
     def test_none(self):
         assert find_steps(np.full(100, 3.0)) == []
-        with pytest.raises(RefusalError, match="the input has no step"):
+        with pytest.raises(RefusalError, match="the input contains no step"):
             step_test(np.full(100, 3.0), np.arange(100.0), PERIOD)
 
 
@@ -325,7 +325,7 @@ class TestIdentifiedModel:
 
     @pytest.mark.parametrize("name", ["coulomb_friction", "spring_constant", "spring_preload"])
     def test_without_these_there_is_none(self, name):
-        with pytest.raises(RefusalError, match=f"{name} was not identified, and a model needs it"):
+        with pytest.raises(RefusalError, match=f"{name} was not identified, but a model needs it"):
             identified_model(without(name))
 
     def test_what_stands_in_is_told(self):

@@ -113,9 +113,9 @@ class TestOfARecord:
         assert one.found == result.parameters["spring_constant"].value
         assert set(verdicts(result).values()) == {Verdict.WEAK}
         assert result.warnings[0] == (
-            f"spring_constant is {one.found:.6g} N/m by the record and 204941 N/m as stated: check "
-            "diaphragm_area (doubled) and the unit of the pressure; 0.0445 m² in place of 0.089 m² "
-            "agrees with the stated spring"
+            f"spring_constant is {one.found:.6g} N/m from the record but stated as 204941 N/m: "
+            "check diaphragm_area (doubled) and the unit of the pressure; 0.0445 m² instead of "
+            "0.089 m² would agree with the stated spring"
         )
         reason = result.parameters["coulomb_friction"].reason
         assert reason == (
@@ -131,8 +131,8 @@ class TestOfARecord:
         assert math.isnan(one.factor)
         assert set(verdicts(result).values()) == {Verdict.WEAK}
         assert result.warnings[0].endswith(
-            "gauge pressure is read as absolute pressure; set pressure_reference to 0 in place of "
-            "101325"
+            "gauge pressure is being read as absolute pressure: set pressure_reference to 0 "
+            "instead of 101325"
         )
 
     def test_a_spring_that_agrees_confirms_the_scale(self, record):
@@ -312,7 +312,7 @@ class TestSettings:
         [
             (
                 {"coulomb_friction": 100.0},
-                "'coulomb_friction' is not a parameter that can be stated; choose from "
+                "'coulomb_friction' is not a parameter that can be stated: choose from "
                 "spring_constant, spring_preload, mass",
             ),
             ({"mass": 0.0}, "mass must be"),
@@ -346,12 +346,12 @@ class TestAssumed:
             one, before = result.parameters[name], known.parameters[name]
             if before.verdict in (Verdict.IDENTIFIED, Verdict.WEAK):
                 assert one.verdict is Verdict.WEAK
-                assert one.reason.endswith("of an assumed area")
+                assert one.reason.endswith("it depends on an assumed area")
             assert repr(one.without_calibration) == repr(before.without_calibration)
         assert result.warnings == (
-            "not stated, and assumed: travel 0.028575 m, diaphragm_area 0.0445 m²; newtons are of "
-            "an assumed area, percent and ratios are not; percent of the travel are of an assumed "
-            "one",
+            "not stated, and assumed: travel 0.028575 m, diaphragm_area 0.0445 m²; values in "
+            "newtons depend on an assumed area; percentages and ratios do not; percentages of the "
+            "travel depend on an assumed travel",
             *known.warnings,
         )
         assert result.to_dict()["settings"]["assumed"] == ["travel", "diaphragm_area"]
@@ -373,7 +373,10 @@ class TestAssumed:
         changed = {n for n in FORCES if result.parameters[n] != known.parameters[n]}
         changed -= {n for n in FORCES if math.isnan(known.parameters[n].value)}
         assert changed == {"spring_preload"}
-        assert result.parameters["spring_preload"].reason == "of an assumed pressure_reference"
+        assert (
+            result.parameters["spring_preload"].reason
+            == "it depends on an assumed pressure_reference"
+        )
 
     def test_what_is_fixed_is_not_compared(self):
         settings = vf.IdentificationSettings(fixed={"mass": 1.6}, stated={"mass": 9.0, **STATED})

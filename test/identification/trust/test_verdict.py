@@ -266,12 +266,12 @@ class TestVerdict:
     def test_it_follows_from_the_wider_interval(self):
         one = calibrated(with_verdict("coulomb_friction", 100.0, 0.5, 1.0), 0.03)
         assert one.verdict is Verdict.WEAK
-        assert one.reason == "with the calibration its interval is ±6.1 % of its value"
+        assert one.reason == "with the calibration uncertainty its interval is ±6.1 % of its value"
         assert one.without_calibration.verdict is Verdict.IDENTIFIED
 
     def test_a_doubt_stays(self):
         one = calibrated(with_verdict("coulomb_friction", 100.0, 0.5, 1.0, "few"), 0.03)
-        told = "few; with the calibration its interval is ±6.1 % of its value"
+        told = "few; with the calibration uncertainty its interval is ±6.1 % of its value"
         assert (one.verdict, one.reason) == (Verdict.WEAK, told)
         one = calibrated(with_verdict("coulomb_friction", 100.0, 0.5, 1.0, "few"), 0.02)
         assert (one.verdict, one.reason) == (Verdict.WEAK, "few")

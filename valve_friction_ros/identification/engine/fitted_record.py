@@ -328,8 +328,8 @@ def fitted_record(record: StampedRecord, valve: Valve) -> FittedRecord:
     inside = (measured.time >= begin) & (measured.time <= end)
     if np.count_nonzero(inside) < _FEWEST:
         raise RefusalError(
-            f"the two signals share {np.count_nonzero(inside)} positions: their clocks differ, or "
-            f"the record is too short; at least {_FEWEST} are needed"
+            f"the two signals overlap in only {np.count_nonzero(inside)} positions (at least "
+            f"{_FEWEST} are needed): their clocks differ, or the record is too short"
         )
     stem = StampedSignal(measured.time[inside] - begin, measured.value[inside])
     drive = StampedSignal(sampled.time - begin, sampled.value)
@@ -342,7 +342,7 @@ def fitted_record(record: StampedRecord, valve: Valve) -> FittedRecord:
             raise RefusalError(
                 f"the record is too long for its sampling: {(end - begin) / 3600:.3g} h with a "
                 f"sample every {finest:.3g} s; use a stretch of "
-                f"{_MOST_FINE_STEPS * longest / 3600:.0f} h at most, and check the unit of time"
+                f"{_MOST_FINE_STEPS * longest / 3600:.0f} h at most, and check the time unit"
             )
         period = finest / math.ceil(finest / longest - 1e-9)
         fine = np.arange(0.0, grid[-1], period, dtype=np.float64)

@@ -190,8 +190,8 @@ def _identified(
     """Identify with the priors of a profile."""
     if "static_friction" in settings.fixed:
         raise RefusalError(
-            f"the method {profile.value} finds F_s itself and takes no known one: leave it out, or "
-            "use the method published"
+            f"the method {profile.value} finds F_s itself: do not fix it, or use the method "
+            "published"
         )
     uniform = measured(recording)
     require_moving_stem(uniform, valve, settings, recording.stamped is not None)
@@ -311,8 +311,8 @@ def _of_simulation(
     curves, balanced, departed = known
     if settings.fixed.get("spring_constant") == 0.0:
         raise RefusalError(
-            "the forces with and against the motion do not surely differ: check that both signals "
-            "belong to this machine, and that it has no spring"
+            "the forces with and against the motion do not differ significantly: check that both "
+            "signals belong to this machine, and that it has no spring"
         )
     prior = prior_of(settings, profile, valve)
     static = math.nan if departed is None else departed.static_friction.value
@@ -322,9 +322,9 @@ def _of_simulation(
     if misfit.is_gross:
         raise RefusalError(
             f"no friction model reproduces the record (fit {100 * misfit.fit:.0f} %, "
-            f"{misfit.systematic * 1e3:.2g} mm of misfit): check that both signals belong to this "
-            "valve, and their units, and that its stem reaches both ends of the travel; if the "
-            "packing was changed during the record, clear the buffer and record again"
+            f"{misfit.systematic * 1e3:.2g} mm misfit): check that both signals belong to this "
+            "valve, check their units, and check that the stem reaches both ends of the travel; "
+            "if the packing was changed during the record, clear the buffer and record again"
         )
     if profile.has_imperfections:
         follows = doubt_of(fits) is None
@@ -340,8 +340,8 @@ def _of_simulation(
         misfit=misfit,
         sliding_speed=_sliding_speed(fit, curves),
         findings=(
-            f"fit {100 * misfit.fit:.2f} %: the most probable model's stem is "
-            f"{stem_distance(misfit.rms, valve)}; {misfit.systematic * 1e6:.3g} µm of it is not "
+            f"fit {100 * misfit.fit:.2f} %: the stem of the most probable model is "
+            f"{stem_distance(misfit.rms, valve)}; {misfit.systematic * 1e6:.3g} µm of this is not "
             "noise",
         ),
         warnings=found_imperfections(fit),
@@ -416,7 +416,7 @@ def _of_force_balance(
     best = next(one for one in curves if one.numbers[SLIDING].value == numbers[SLIDING].value)
     misfit = curve_misfit(best, numbers[SLIDING])
     reproduced = f"the force balance reproduces {100 * misfit.fit:.2f} % of the force"
-    beyond = f"; {misfit.words} of the rest are not noise" if misfit.systematic > 0.0 else ""
+    beyond = f"; {misfit.words} of the residual is not noise" if misfit.systematic > 0.0 else ""
     return _Outcome(
         parameters=curve_verdicts(numbers, settings, best.stribeck_velocity, force_range),
         numbers=numbers,
@@ -524,8 +524,8 @@ def _doubts(misfit: Misfit) -> tuple[str, ...]:
     if misfit.describes:
         return ()
     return (
-        f"the Karnopp model does not describe this valve: {misfit.words} of what was measured are "
-        "more than noise",
+        "the Karnopp model does not describe this valve: the residual exceeds the noise by "
+        f"{misfit.words}",
     )
 
 
@@ -534,8 +534,8 @@ def _left_to_published(settings: IdentificationSettings) -> tuple[str, ...]:
     if settings.position_bias is None:
         return ()
     return (
-        f"the position bias of {settings.position_bias * 1e3:.4g} mm is of the published method "
-        "alone: here the preload is found",
+        f"the position bias of {settings.position_bias * 1e3:.4g} mm belongs to the published "
+        "method only: this method finds the preload",
     )
 
 

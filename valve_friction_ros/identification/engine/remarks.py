@@ -76,7 +76,7 @@ def _stamp_remarks(name: str, signal: StampedSignal) -> list[str]:
     if gaps.size:
         seconds = float(np.sum(gaps)) * signal.period
         count = "a gap" if gaps.size == 1 else f"{gaps.size} gaps"
-        remarks.append(f"{count} in {name}, {seconds:.2g} s together, left out")
+        remarks.append(f"{count} in {name}, {seconds:.2g} s in total, left out")
     return remarks
 
 
@@ -91,11 +91,13 @@ def _value_remarks(name: str, signal: StampedSignal) -> list[str]:
     noise = stamped_noise(signal)
     if held > _HELD:
         remarks.append(
-            f"values of {name} are held for {1e3 * held * signal.period:.2g} ms: a slow source, or "
+            f"values of {name} hold for {1e3 * held * signal.period:.2g} ms: a slow source, or "
             "the dead band of a historian"
         )
     if step > _COARSE * noise:
-        remarks.append(f"the resolution of {name} is coarse: steps of {step:.2g}, above its noise")
+        remarks.append(
+            f"the resolution of {name} is coarse: its steps of {step:.2g} exceed the noise"
+        )
     return remarks
 
 
@@ -107,7 +109,7 @@ def _noise_remarks(name: str, signal: StampedSignal) -> list[str]:
         if lasting > _COLOURED * noise:
             remarks.append(
                 f"the noise of {name} is not white: {lasting / noise:.2g} times as large over "
-                f"{1e3 * _LASTING:g} ms as between neighbours"
+                f"{1e3 * _LASTING:g} ms as between successive samples"
             )
     return remarks
 

@@ -38,8 +38,8 @@ _LEAST = {
 """Least size of an imperfection that is worth a sentence, in its own unit."""
 
 _OTHERS = {
-    "start_position": "where the stem was at first",
-    ROUNDING: "the force within a step of its converter",
+    "start_position": "the initial stem position",
+    ROUNDING: "the force within one step of the converter",
 }
 """Words of the sources of doubt that are no imperfections."""
 
@@ -102,7 +102,7 @@ def main_doubt(budget: Budget, width: str) -> str:
     ]
     share = f"its interval is {width}"
     if not named:
-        return f"{share}, by noise and by what the model leaves of the motion"
+        return f"{share}, due to noise and to motion that the model does not explain"
     return f"{share}: the record does not determine {' and '.join(named[:3])}"
 
 
@@ -110,19 +110,19 @@ def late_sensor(name: str, value: float) -> str:
     """Say what a number would be if the sensor of the stem were slow."""
     unit = UNITS.get(name, "N")
     return (
-        f"it would be {value:.3g} {unit} with a slow stem sensor, whose lag the record cannot tell "
-        "from viscous friction; state timing_uncertainty"
+        f"it would be {value:.3g} {unit} with a slow stem sensor, whose lag the record cannot "
+        "separate from viscous friction; set timing_uncertainty"
     )
 
 
 def by_stretch(used: float, motion: float) -> str:
     """Return how much of the motion in a long record was used, both s."""
     return (
-        f"of {motion / 60:.3g} min of motion, the {used / 60:.3g} min in which the stem travels "
-        "furthest were used"
+        f"used the {used / 60:.3g} min with the most stem travel out of {motion / 60:.3g} min of "
+        "motion"
     )
 
 
 def by_departures(count: int) -> str:
     """Return from how many departures of the stem F_s comes."""
-    return f"the static friction is the force at which the stem left its rests, {count} times"
+    return f"the static friction is taken from {count} breakaways of the stem from rest"

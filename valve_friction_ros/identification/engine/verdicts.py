@@ -49,14 +49,14 @@ Chosen: well below the 25 % of growth that raises the first alarm."""
 
 _DOUBTS = {
     Doubt.MISFIT: (
-        "the motion is not quite that of any friction model here ({um:.2g} µm are not noise), "
-        "which leaves the sliding friction but not what it is made of"
+        "no friction model here reproduces the motion exactly ({um:.2g} µm are not noise): the "
+        "sliding friction is reliable, its components are not"
     ),
     Doubt.LAG: (
-        "the best fit has the signals {ms:.0f} ms apart, which is not plausible: something else in "
-        "the motion passes for a lag"
+        "the best fit puts the signals {ms:.0f} ms apart, which is not plausible: something else "
+        "in the motion looks like a lag"
     ),
-    Doubt.UNTRIED: "the search ended before it had tried other lags: bring a shorter record",
+    Doubt.UNTRIED: "the search ended before it tried other lags: use a shorter record",
 }
 _FAILED = 100.0
 """Inflation of the residual beyond which nothing that only the simulation knows is reported: ten
@@ -70,9 +70,12 @@ stem goes more slowly than its top speed: a short peak tells no friction."""
 _BY_SPEED = ("coulomb_friction", "viscous_friction", "static_friction", "stribeck_velocity")
 """What a friction that falls with speed has in other proportions at higher speeds."""
 
-_EXTRAPOLATED = "it lies outside the moves of the record, along a spring that is not identified"
+_EXTRAPOLATED = (
+    "it lies outside the stroke recorded, and the spring is not identified well "
+    "enough to extrapolate"
+)
 
-_UNCONFIRMED = "it follows from the forces alone: no simulated stem confirms it"
+_UNCONFIRMED = "it follows from the forces alone and is not confirmed by simulation"
 _OF_THE_BALANCE = (SLIDING, "spring_constant", "spring_preload")
 """What the force balance of the sliding stem determines without a simulation."""
 
@@ -137,8 +140,8 @@ def fit_verdicts(
     force_range = float(np.ptp(fit.model.record.force))
     if not misfit.describes:
         doubt = (
-            "the Karnopp model does not describe this valve: "
-            f"{misfit.systematic * 1e6:.3g} µm of misfit are not noise"
+            f"the Karnopp model does not describe this valve: {misfit.systematic * 1e6:.3g} µm of "
+            "the misfit is not noise"
         )
     top = _top_speed(fit)
     slow, split = _slow_doubt(top), _split_doubt(fits, misfit, profile)
@@ -203,8 +206,8 @@ def _unseen(
     mass = numbers.get("mass")
     if mass is not None and ("mass" in fit.kept or mass.half_width > abs(mass.value)):
         why["mass"] = (
-            "inertia is too small a part of the force to be seen; "
-            f"{settings.assumed_mass:g} kg assumed"
+            "inertia is too small a part of the force to be identified; "
+            f"{settings.assumed_mass:g} kg is assumed"
         )
     for name in ("static_friction", "stribeck_velocity"):
         one = numbers.get(name)
@@ -272,6 +275,6 @@ def _slow_doubt(top: float) -> str:
     if top >= FALL_SPEED:
         return ""
     return (
-        f"holds up to {top * 1e3:.2g} mm/s, as little of the way is faster: "
-        f"friction may fall further up to {FALL_SPEED * 1e3:.2g} mm/s"
+        f"valid up to {top * 1e3:.2g} mm/s, because the stem is rarely faster: friction may fall "
+        f"further up to {FALL_SPEED * 1e3:.2g} mm/s"
     )

@@ -80,8 +80,8 @@ def choose_threshold(sweep: Sweep, window: int) -> int:
     usable = np.isfinite(sweep.sigma) & (sweep.samples >= sweep.free * window)
     if not usable.any():
         raise LittleMotionError(
-            "no threshold leaves enough moving samples to determine "
-            f"{sweep.free} parameters: record more strokes, or fix a parameter"
+            f"no threshold leaves enough samples in motion to determine {sweep.free} parameters: "
+            "record more strokes, or fix a parameter"
         )
     floor = _RESOLUTION * max(float(np.nanmax(sweep.sigma)), np.finfo(float).tiny)
     criterion = 2 * sweep.free * np.log(np.maximum(sweep.sigma, floor)) - sweep.log_information
@@ -275,7 +275,7 @@ def _static_friction(
     coulomb_friction = values["coulomb_friction"]
     if not breakaways:
         warnings.append(
-            "the record shows no breakaway from rest: static_friction is set to coulomb_friction"
+            "the record contains no breakaway from rest: static_friction is set to coulomb_friction"
         )
         return coulomb_friction
     samples = np.array([breakaway.sample for breakaway in breakaways])

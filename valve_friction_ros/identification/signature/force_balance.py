@@ -79,7 +79,7 @@ evidence."""
 _LEAST_FIT = 0.9
 """Least share of the motion that the model must reproduce. The limit of `Misfit.is_gross`."""
 
-_HIDDEN = "the stem jumps as it breaks away, too fast or too little to measure in this record"
+_HIDDEN = "the stem jumps as it breaks away, too fast or by too little to measure in this record"
 
 _BREAKAWAY_BIAS = 0.01
 _STIFFNESS_BIAS = 2e-3
@@ -206,8 +206,8 @@ def _from_rest(signature: ValveSignature) -> list[list[SignatureStroke]]:
     ways = [[one for one in way if one.breakaway is not None] for way in signature.ways]
     if min(map(len, ways)) < _FEWEST_EACH_WAY:
         raise RefusalError(
-            f"the force balance needs {_FEWEST_EACH_WAY} strokes from rest each way; the record "
-            f"has {len(ways[0])} up and {len(ways[1])} down: {TRIANGLE_NEEDED}"
+            f"the force balance needs {_FEWEST_EACH_WAY} strokes from rest in each direction; the "
+            f"record has {len(ways[0])} up and {len(ways[1])} down: {TRIANGLE_NEEDED}"
         )
     return ways
 
@@ -217,9 +217,9 @@ def _balanced(ways: Ways, settings: IdentificationSettings) -> Jackknife:
     found = jackknife(ways, lambda some: _figures(some, settings))
     if found.values["static_friction"] <= 0:
         raise RefusalError(
-            f"the breakaway points give a static friction of "
-            f"{found.values['static_friction']:.4g} N, and friction is above zero: check the "
-            "direction and the clocks of both signals"
+            "the breakaway points give a negative static friction, "
+            f"{found.values['static_friction']:.4g} N: check the direction and the clocks of both "
+            "signals"
         )
     return found
 
@@ -246,7 +246,7 @@ def _findings(signature: ValveSignature, validation: Validation, valve: Valve) -
     upward, downward = signature.upward_points, signature.downward_points
     drive = valve.driven_by
     return (
-        f"fit {100 * validation.fit:.2f} %: the model's stem is "
+        f"fit {100 * validation.fit:.2f} %: the stem of the model is "
         f"{stem_distance(validation.rms, valve)}",
         f"signature: {len(upward)} strokes up and {len(downward)} down, bias x̄ "
         f"{signature.position_bias * 1e3:.4g} mm, dead zone "

@@ -31,8 +31,8 @@ from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.wording import percentage
 
 TRIANGLE_NEEDED = (
-    "excite the valve by a slow triangular wave of pressure, such as 60 s a period, "
-    "for two periods or more"
+    "drive the valve with a slow triangular pressure wave, such as a period of 60 s, for two "
+    "periods or more"
 )
 """The remedy in refusals: the excitation that gives a valve signature."""
 
@@ -143,8 +143,8 @@ def mean_spring_constant(ways: Ways) -> float:
     found = float(np.mean([stroke.spring_constant for way in ways for stroke in way]))
     if not found > 0:
         raise RefusalError(
-            f"the drive does not rise with the sliding stem (spring constant {found:.3g} N/m): "
-            "check that both signals belong to this valve, and share one clock"
+            f"the drive does not rise as the stem slides (spring constant {found:.3g} N/m): check "
+            "that both signals belong to this valve, and that they share one clock"
         )
     return found
 
@@ -234,13 +234,13 @@ def valve_signature(
         steadiness = float(np.median([stroke.steadiness for stroke in strokes]))
         if steadiness < _LEAST_STEADINESS:
             raise RefusalError(
-                "the stem does not slide at a constant speed, as a valve signature needs "
-                f"(only {100 * steadiness:.0f} % of a stroke's way is steady): {TRIANGLE_NEEDED}"
+                "a valve signature needs a stem that slides at a constant speed (only "
+                f"{100 * steadiness:.0f} % of a stroke is steady): {TRIANGLE_NEEDED}"
             )
     if not all(counts):
         raise RefusalError(
-            "a valve signature needs strokes from rest both ways at a constant speed; the record "
-            f"has {counts[0]} up and {counts[1]} down: {TRIANGLE_NEEDED}"
+            "a valve signature needs strokes from rest in both directions at a constant speed; "
+            f"the record has {counts[0]} up and {counts[1]} down: {TRIANGLE_NEEDED}"
         )
 
     def figures(ways: Ways) -> dict[str, float]:

@@ -297,7 +297,7 @@ def step_test(
     edges = [*(find_steps(signal) if starts is None else starts), signal.size]
     if len(edges) == 1:
         raise RefusalError(
-            "the input has no step: record steps, or give the samples at which they begin"
+            "the input contains no step: record steps, or give the samples at which they begin"
         )
     if edges[0] < 1 or min(np.diff(edges)) < 1:
         raise ValueError(f"steps must begin at increasing samples from 1 to {signal.size - 1}")

@@ -81,7 +81,7 @@ def identified_model(
     for name in _NEEDED:
         if name not in found:
             raise RefusalError(
-                f"{name} was not identified, and a model needs it: identify a record that "
+                f"{name} was not identified, but a model needs it: identify a record that "
                 "determines it"
             )
     notes = []
@@ -89,7 +89,7 @@ def identified_model(
         notes.append(f"viscous_friction is negative ({found.pop('viscous_friction'):.4g} N·s/m)")
     if "spring_preload" not in found and "spring_preload" not in nominal:
         raise RefusalError(
-            "spring_preload was not identified, and a model needs it: name it in the valve file, "
+            "spring_preload was not identified, but a model needs it: give it in the valve file, "
             "or identify a record that determines it"
         )
     mass = found.get("mass", nominal.get("mass", IdentificationSettings().assumed_mass))
@@ -97,7 +97,7 @@ def identified_model(
         "mass": (mass, "assumed"),
         "viscous_friction": (
             2 * math.sqrt(found["spring_constant"] * mass),
-            "critical damping, the smallest value without oscillation",
+            "critical damping, the smallest value that avoids oscillation",
         ),
         "static_friction": (found["coulomb_friction"], "the coulomb_friction"),
         "spring_preload": (0.0, ""),

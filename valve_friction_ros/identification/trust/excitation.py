@@ -100,9 +100,9 @@ def require_drive(recording: Recording, valve: Valve) -> None:
     """
     if recording.driven_by is not valve.driven_by:
         raise ValueError(
-            f"the recording holds a {recording.driven_by.words}, the valve is driven by a "
-            f"{valve.driven_by.words}: leave the diaphragm_area of the valve out for a recorded "
-            "force, and give it for a pressure"
+            f"the recording holds a {recording.driven_by.words}, but the valve is driven by a "
+            f"{valve.driven_by.words}: omit diaphragm_area for a recorded force, and give it for "
+            "a recorded pressure"
         )
 
 
@@ -113,8 +113,8 @@ def require_enough_samples(recording: Recording, window: int) -> None:
     """
     if not _SHORTEST_PERIOD <= recording.sample_period <= _LONGEST_PERIOD:
         raise RefusalError(
-            f"a sample every {recording.sample_period:.3g} s is none of a valve: "
-            "check the unit of time"
+            f"a sample every {recording.sample_period:.3g} s is not plausible for a valve: check "
+            "the time unit"
         )
     least = _LEAST_WINDOWS * window
     if len(recording) < least:
@@ -137,7 +137,7 @@ def require_motion(recording: Recording) -> None:
     if span == 0 or span < _MOTION_OVER_NOISE * noise:
         raise LittleMotionError(
             f"the stem did not move: its position spans {span * 1e6:.3g} µm with "
-            f"{noise * 1e6:.3g} µm of noise; excite the valve over several percent of its travel"
+            f"{noise * 1e6:.3g} µm of noise; move the valve over several percent of its travel"
         )
 
 
@@ -177,8 +177,8 @@ def require_two_directions(recording: Recording, window: int, travel: float = ma
     if min(up, down) < max(_LEAST_SHARE_OF_DIRECTION * (up + down), elastic):
         way = "up" if up > down else "down"
         raise LittleMotionError(
-            f"the stem moved {way} only ({up * 1e3:.3g} mm up, {down * 1e3:.3g} mm down): "
-            "friction and spring cannot be separated; record at least one stroke each way"
+            f"the stem moved only {way} ({up * 1e3:.3g} mm up, {down * 1e3:.3g} mm down): "
+            "friction and spring cannot be separated; record at least one stroke in each direction"
         )
 
 
@@ -191,7 +191,7 @@ def require_within_travel(recording: Recording, valve: Valve) -> None:
     if lowest < -_OUTSIDE * travel or highest > (1 + _OUTSIDE) * travel:
         question = position_question(max(-lowest, highest), travel)
         raise RefusalError(
-            f"the stem position runs from {lowest:.4g} to {highest:.4g} m, the travel from 0 to "
+            f"the stem position runs from {lowest:.4g} to {highest:.4g} m, but the travel is 0 to "
             f"{travel:.4g} m: check that the signals are not swapped, and check unit (m), zero "
             f"and travel{question and f': {question}'}"
         )
@@ -204,8 +204,8 @@ def require_travel(recording: Recording, valve: Valve) -> None:
     if np.isfinite(valve.travel) and way < _LEAST_TRAVEL * valve.travel:
         raise LittleMotionError(
             f"too little travel: the stem moved {way * 1e3:.3g} mm, "
-            f"{percentage(way / valve.travel)} of its travel; "
-            "excite the valve over several percent of it"
+            f"{percentage(way / valve.travel)} of its travel; move it over several percent of the "
+            "travel"
         )
 
 
@@ -262,7 +262,7 @@ def require_changing_drive(recording: Recording) -> None:
     words = recording.driven_by.words
     if np.ptp(recording.drive) == 0:
         raise LittleMotionError(
-            f"the {words} did not change: excite the valve, or check the {words} sensor"
+            f"the {words} did not change: move the valve, or check the {words} sensor"
         )
 
 
@@ -274,12 +274,12 @@ def require_related_signals(recording: Recording) -> None:
     if share < _LEAST_FOLLOWED:
         raise RefusalError(
             f"{words} and stem do not move together (position and direction of the moving stem "
-            f"explain {100 * share:.0f} % of the {words}): check that both signals belong to "
-            "this valve, are not swapped, come from working sensors, and share one clock"
+            f"explain {100 * share:.0f} % of the {words}): check that both signals belong to this "
+            "valve, are not swapped, come from working sensors, and that they share one clock"
         )
     if slope < 0 and share > _SURELY_FOLLOWED and not dissipates:
         raise RefusalError(
-            f"the stem moves against the {words}: invert the position, so that it grows in the "
+            f"the stem moves against the {words}: invert the position so that it increases in the "
             f"direction in which {words} pushes the stem"
         )
     steps, span = np.diff(position), float(np.ptp(position))

@@ -118,7 +118,7 @@ def require_plausible_units(
         raise RefusalError(problem)
     if not np.isfinite(valve.travel) and place > _TRAVEL.possible[1]:
         raise RefusalError(
-            f"the stem position reaches {place:.4g} m, further than any valve: "
+            f"the stem position reaches {place:.4g} m, more than the travel of any control valve: "
             + position_question(place, _TRAVEL.ordinary[1])
         )
     if len(recording) > _LEAST_SAMPLES:

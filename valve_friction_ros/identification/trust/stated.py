@@ -225,13 +225,15 @@ def _of_assumed(
     reasons: dict[str, str] = {}
     consequences = []
     if "pressure_reference" in assumed:
-        reasons["spring_preload"] = "of an assumed pressure_reference"
-        consequences.append("spring_preload is of an assumed pressure_reference")
+        reasons["spring_preload"] = "it depends on an assumed pressure_reference"
+        consequences.append("spring_preload depends on an assumed pressure_reference")
     if "diaphragm_area" in assumed and not _scale_is_confirmed(parameters, stated):
-        reasons |= dict.fromkeys(OF_FORCE, "of an assumed area")
-        consequences.insert(0, "newtons are of an assumed area, percent and ratios are not")
+        reasons |= dict.fromkeys(OF_FORCE, "it depends on an assumed area")
+        consequences.insert(
+            0, "values in newtons depend on an assumed area; percentages and ratios do not"
+        )
     if "travel" in assumed:
-        consequences.append("percent of the travel are of an assumed one")
+        consequences.append("percentages of the travel depend on an assumed travel")
     taken = ", ".join(f"{name} {getattr(valve, name):g} {_UNITS[name]}" for name in assumed)
     told = "; ".join([f"not stated, and assumed: {taken}", *consequences])
     return reasons, [told]
@@ -255,7 +257,7 @@ def with_stated(
     told = {one.name: one for one in contradictions(parameters, stated, valve, span)}
     found = dict(parameters)
     reasons, sentences = _of_assumed(parameters, stated, assumed, valve)
-    reasons |= {name: f"the stated {name} contradicts it" for name in told}
+    reasons |= {name: f"it contradicts the stated {name}" for name in told}
     witness = next((name for name in ("spring_constant", "spring_preload") if name in told), "")
     if witness and not _scale_is_confirmed(parameters, stated):
         doubt = f"the scale of the forces is in doubt: the stated {witness} contradicts the record"
@@ -270,8 +272,8 @@ def _sentence(one: Contradiction, valve: Valve) -> str:
     """Say what contradicts what, and what to check."""
     unit = PARAMETER_UNITS[one.name]
     return (
-        f"{one.name} is {one.found:.6g} {unit} by the record and {one.stated:.6g} {unit} as "
-        f"stated: {_remedy(one, valve)}"
+        f"{one.name} is {one.found:.6g} {unit} from the record but stated as {one.stated:.6g} "
+        f"{unit}: {_remedy(one, valve)}"
     )
 
 
@@ -283,7 +285,7 @@ def _remedy(one: Contradiction, valve: Valve) -> str:
             return f"check the unit of the force, which is off by a factor of {one.factor:.3g}"
         return (
             f"check diaphragm_area{how} and the unit of the pressure; {area / one.factor:.3g} m² "
-            f"in place of {area:.3g} m² agrees with the stated spring"
+            f"instead of {area:.3g} m² would agree with the stated spring"
         )
     if one.cause is Cause.OTHER_SPRING:
         scale = "the scale of a sensor" if area is None else "diaphragm_area or a sensor's scale"
@@ -291,12 +293,12 @@ def _remedy(one: Contradiction, valve: Valve) -> str:
     if one.cause is Cause.ZERO_OF_PRESSURE:
         kinds = ("absolute", "gauge") if one.pressure > 0 else ("gauge", "absolute")
         return (
-            f"{kinds[0]} pressure is read as {kinds[1]} pressure; set pressure_reference to "
-            f"{_reference(one.pressure, valve):g} in place of {valve.pressure_reference:g}"
+            f"{kinds[0]} pressure is being read as {kinds[1]} pressure: set pressure_reference to "
+            f"{_reference(one.pressure, valve):g} instead of {valve.pressure_reference:g}"
         )
     if one.cause is Cause.OTHER_PRELOAD:
         zero = "force sensor is off"
         if not math.isnan(one.pressure):
             zero = f"pressure sensor is off by {one.pressure / 1e3:.3g} kPa"
-        return f"the zero of the {zero}, that of the position is another, or the preload is"
-    return "check the stated mass and the stamps of both signals"
+        return f"the zero of the {zero}, the zero of the position differs, or the preload does"
+    return "check the stated mass and the time stamps of both signals"

@@ -25,7 +25,7 @@ FALL_SPEED = 6.5e-3
 At 2·v_s the fall is complete but for e⁻⁴ = 2 %. A slower record does not separate F_c from the
 friction at low speed. An absolute size from one packing, applied to every valve."""
 
-NO_SLIP = "no slip jump in the record: F_s cannot be separated from F_c"
+NO_SLIP = "the record shows no slip jump: F_s cannot be separated from F_c"
 """Reason of a static friction that is not identifiable."""
 
 
@@ -230,7 +230,7 @@ def calibrated(one: Parameter, share: float) -> Parameter:
     verdict, reason = one.verdict, one.reason
     if wide > WEAK_SHARE:
         verdict = Verdict.WEAK
-        told = f"with the calibration its interval is ±{percentage(wide)} of its value"
+        told = f"with the calibration uncertainty its interval is ±{percentage(wide)} of its value"
         reason = f"{reason}; {told}" if reason else told
     return replace(
         one,
