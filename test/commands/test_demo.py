@@ -305,8 +305,9 @@ def children(pid):
     return Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
 
 
-def test_interrupted(ros_environment, tmp_path):
-    """Ctrl-C while the nodes run: one line, and no node stays."""
+@pytest.mark.parametrize("request_to_end", [signal.SIGINT, signal.SIGHUP])
+def test_interrupted(request_to_end, ros_environment, tmp_path):
+    """Ctrl-C, or a closed terminal, while the nodes run: one line, and no node stays."""
     process = subprocess.Popen(
         [sys.executable, "-m", "valve_friction_ros", "demo"],
         stdout=subprocess.PIPE,
@@ -318,7 +319,7 @@ def test_interrupted(ros_environment, tmp_path):
     wait_until(lambda: len(children(process.pid)) >= 3)
     time.sleep(1.0)
     nodes = children(process.pid)
-    process.send_signal(signal.SIGINT)
+    process.send_signal(request_to_end)
     _, err = process.communicate(timeout=60)
     assert process.returncode == 130
     assert err == "valve_friction demo: interrupted\n"

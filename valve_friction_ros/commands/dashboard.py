@@ -14,7 +14,7 @@ import contextlib
 import sys
 from pathlib import Path
 
-from valve_friction_ros.commands.process import ExitCode, sigterm_raises
+from valve_friction_ros.commands.process import ExitCode, requests_raise
 from valve_friction_ros.dashboard import DashboardOptions, Plant
 from valve_friction_ros.dashboard.accounts import Access, accounts_from
 from valve_friction_ros.dashboard.alarm_list import HistoryOperator
@@ -63,7 +63,7 @@ def run(options: argparse.Namespace) -> int:
     context = DashboardContext(
         shown, plant, history, operator, NoSignals(), visitors, is_live=False
     )
-    sigterm_raises()
+    requests_raise()
     with contextlib.suppress(KeyboardInterrupt):
         server.serve(
             context, lambda: _log(f"ready: open {shown.address}"), _log, is_active=lambda: True

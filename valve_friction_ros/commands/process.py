@@ -150,9 +150,14 @@ def interrupt_raises() -> Iterator[None]:
     yield
 
 
-def sigterm_raises() -> None:
-    """Let SIGTERM raise KeyboardInterrupt from now on, also where Ctrl-C is ignored."""
+def requests_raise() -> None:
+    """Let SIGTERM raise KeyboardInterrupt from now on, also where Ctrl-C is ignored.
+
+    So does the end of the terminal (SIGHUP), unless ``nohup`` has the process outlive it.
+    """
     signal.signal(signal.SIGTERM, _interrupt)
+    if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
+        signal.signal(signal.SIGHUP, _interrupt)
     sys.unraisablehook = _interrupt_again
 
 

@@ -33,7 +33,7 @@ from valve_friction_ros.commands.demo.bench import (
     running_nodes,
 )
 from valve_friction_ros.commands.demo.plant import require_dashboard, show_plant
-from valve_friction_ros.commands.process import ExitCode, sigterm_raises
+from valve_friction_ros.commands.process import ExitCode, requests_raise
 from valve_friction_ros.figures import Case, friction_figure, require_picture_file, save_picture
 from valve_friction_ros.health import Level
 from valve_friction_ros.identification import (
@@ -273,7 +273,7 @@ def run(options: argparse.Namespace) -> int:
     with console.status("preparing"):  # beside each other, several nodes would compile the same
         compile_methods()
     os.environ.update(quick_discovery())
-    sigterm_raises()  # the nodes have sessions of their own, and would stay
+    requests_raise()  # the nodes have sessions of their own, and would stay
     with free_domain() as domain, TemporaryDirectory(prefix="valve_friction_demo") as home:
         os.environ |= {"ROS_DOMAIN_ID": str(domain), "ROS_HOME": home}  # a demo is no plant's
         if options.dashboard:
