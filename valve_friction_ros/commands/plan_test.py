@@ -179,7 +179,7 @@ def print_plan(plan: StrokePlan, path: Path) -> None:
     console.print(table)
     console.print(
         "On simulated valves of other physics the reported intervals were 1.5 to 1.8 times as "
-        "wide (median), and that of F_c up to 16 times where friction that varies along the "
+        "wide (median), and that of F_c up to 16 times where friction varies along the "
         "travel or gradually with speed."
     )
     for remark in plan_remarks(plan):
