@@ -492,8 +492,8 @@ IDENTIFICATION = (
         Setting(
             None,
             name=f"fixed.{name}",
-            description=f"Known value of {name} [{UNITS.get(name, 'm/s')}], then not identified; "
-            "unset: unknown",
+            description=f"Known value of {name} [{UNITS.get(name, 'm/s')}]; it is then not "
+            "identified; unset: unknown",
         )
         for name in FIXABLE
     ),
@@ -507,7 +507,7 @@ _BY_DATA_SHEET = tuple(
     replace(
         one,
         initial=None,
-        description=f"{one.description}, from the data sheet: compared with what a record shows",
+        description=f"{one.description}, from the data sheet: compared with the record",
     )
     for one in KARNOPP
     if one.name in STATED

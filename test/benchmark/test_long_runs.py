@@ -170,7 +170,9 @@ MONTH = [life(), call()]
 def test_what_adds_up_misses_nothing():
     killed = life("SIGKILL", 50, 20, 0, unsaved=1)
     refused = call(success=False, message="the record is too short")
-    busy = call(success=False, message="an identification is already running: wait for it")
+    busy = call(
+        success=False, message="an identification is already running: wait until it finishes"
+    )
     cut = call(None, None, ended="SIGKILL")
     kept_late = call()  # it waited for a full disk as its process was killed
     assert missed_in_a_month([*MONTH, killed, refused, busy, cut, kept_late], stored=2) == set()

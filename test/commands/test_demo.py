@@ -393,7 +393,7 @@ def test_what_a_client_is_told(ros_environment):
         "no answer of /fv_7/nobody/set_parameters_atomically within 0.1 s"
     )
     assert told["absent service"] == (
-        "/fv_7/identifier/dance is not there: start the identifier of this valve"
+        "/fv_7/identifier/dance is not available: start the identifier of this valve"
     )
     assert "actuator_pressure" in told["message"]
     assert told["estimate_valid"] == "false"

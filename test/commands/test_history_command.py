@@ -121,10 +121,10 @@ class TestBaselines:
         assert ["baseline" in row for row in rows] == [False, True, False, True, True]
         old, new = "coulomb friction 141.0 ± 1.0 N", "coulomb friction 600.0 ± 8.0 N"
         assert rows[1].startswith("2026-09-22 14:13:20 baseline ERROR set_baseline: ")
-        assert rows[1].strip().endswith(f"{new}; previous result: {old}")
+        assert rows[1].strip().endswith(f"{new}; previous: {old}")
         assert rows[3].startswith("2026-09-24 14:13:20 baseline OK restore_baseline: ")
-        assert rows[3].strip().endswith(f"{old}; previous result: {new}")
-        assert rows[4].strip().endswith(f"OK restore_baseline: none; previous result: {new}")
+        assert rows[3].strip().endswith(f"{old}; previous: {new}")
+        assert rows[4].strip().endswith(f"OK restore_baseline: none; previous: {new}")
 
     def test_in_json(self, run, changed):
         _, output, _ = run("--json", path=changed)

@@ -103,7 +103,7 @@ def test_a_first_compilation_is_logged_once(kernels):
             capture_output=True,
             text=True,
             check=True,
-        ).stdout.count("told: numeric code is compiled")
+        ).stdout.count("told: compiling numeric code")
         for _ in range(2)
     ]
     assert told == [1, 0]

@@ -163,7 +163,7 @@ def test_a_history_that_goes_while_the_node_runs_costs_no_baseline(live, history
         other.path.rename(history.path)
     client.identified(TIGHT)
     assert client.statuses[-1][1].level == ERROR
-    client.wait_until(lambda: "baseline in force is kept again" in node.errors, "a warning")
+    client.wait_until(lambda: "baseline in force is stored again" in node.errors, "a warning")
     again = history.baseline(VALVE.name)
     assert (again.baseline, again.time) == (kept.baseline, kept.time)
     live.kill(node)
@@ -175,7 +175,7 @@ def test_two_nodes_of_one_valve_are_told(live):
     live.start_identifier(PATIENT)
     first = live.nodes[-1]
     live.start_identifier(PATIENT)
-    told = "another node keeps the history of /fv_101/identifier"
+    told = "another node writes the history of /fv_101/identifier"
     status = live.client.next_status(lambda one: told in one.message, "the second node")
     assert status.level == WARN
     assert values_of(status)["NE 107"] == "M"
@@ -206,13 +206,13 @@ def test_a_node_without_a_history_says_so_and_keeps_nothing(live, history):
     live.start_identifier({**PATIENT, "history_file": "''"})
     client = live.client
     told = client.status_values()["history"]
-    assert told == "none, as history_file is empty: diagnosis and baseline end with this node"
-    client.identified(HEALTHY)
-    assert client.trigger("set_baseline").message == (
-        f"baseline: {OLD}; previous result: none{TAKEN}"
+    assert told == (
+        "none, because history_file is empty: diagnosis and baseline are lost when this node stops"
     )
+    client.identified(HEALTHY)
+    assert client.trigger("set_baseline").message == (f"baseline: {OLD}; previous: none{TAKEN}")
     assert client.last_values()["friction_ratio"] == "1"
-    assert client.trigger("restore_baseline").message == f"baseline: none; previous result: {OLD}"
+    assert client.trigger("restore_baseline").message == f"baseline: none; previous: {OLD}"
     client.next_status(lambda one: "no baseline yet" in one.message, "no baseline")
     assert math.isnan(*client.parameters(NODE, "baseline_coulomb_friction"))
     assert not history.path.exists()
@@ -225,15 +225,13 @@ def test_the_baseline_is_guarded_and_restored(live, history):
     assert not nothing.success
     assert nothing.message.startswith("there is no ~/set_baseline to undo")
     client.identified(HEALTHY)
-    assert client.trigger("set_baseline").message == (
-        f"baseline: {OLD}; previous result: none{TAKEN}"
-    )
+    assert client.trigger("set_baseline").message == (f"baseline: {OLD}; previous: none{TAKEN}")
     client.identified(TIGHT)
     for service in ("set_baseline", "restore_baseline"):
         refused = client.trigger(service)
         assert not refused.success
-        assert refused.message.startswith("the valve is in ERROR, which another baseline may hide")
-        assert "set baseline_in_alarm to true if the valve is healthy" in refused.message
+        assert refused.message.startswith("the valve is in ERROR, which a new baseline could hide")
+        assert "if the valve is healthy, set baseline_in_alarm to true" in refused.message
     told = client.status_values()
     assert (told["baseline_possible"], told["baseline_lacks valve"]) == ("false", "HEALTH")
     assert told["friction_ratio"] != "1"
@@ -242,7 +240,7 @@ def test_the_baseline_is_guarded_and_restored(live, history):
     assert client.set_together(NODE, {"baseline_in_alarm": True}).successful
     answer = client.trigger("set_baseline")
     assert answer.success
-    assert answer.message == f"baseline: {NEW}; previous result: {OLD}{TAKEN}"
+    assert answer.message == f"baseline: {NEW}; previous: {OLD}{TAKEN}"
     assert client.next_status().level == OK
     live.kill(node)
 
@@ -250,7 +248,7 @@ def test_the_baseline_is_guarded_and_restored(live, history):
     assert client.next_status().level == OK
     answer = client.trigger("restore_baseline")
     assert answer.success
-    assert answer.message == f"baseline: {OLD}; previous result: {NEW}"
+    assert answer.message == f"baseline: {OLD}; previous: {NEW}"
     status = client.next_status()
     assert status.level == ERROR
     assert "excess friction" in status.message
@@ -273,19 +271,17 @@ def test_a_baseline_of_the_parameter_is_replaced_and_comes_back(live, history):
     client = live.client
     client.identified(HEALTHY)
     given = Baseline(140.0)
-    assert client.trigger("set_baseline").message == (
-        f"baseline: {OLD}; previous result: {given}{TAKEN}"
-    )
+    assert client.trigger("set_baseline").message == (f"baseline: {OLD}; previous: {given}{TAKEN}")
     assert client.set_together(NODE, {"baseline_coulomb_friction": 145.0}).successful
     refused = client.trigger("restore_baseline")
     assert not refused.success
-    assert "is not in force any more: set baseline_coulomb_friction" in refused.message
+    assert "is no longer in force: set baseline_coulomb_friction" in refused.message
     assert (
         client.trigger("set_baseline").message
-        == f"baseline: {OLD}; previous result: {Baseline(145.0)}{TAKEN}"
+        == f"baseline: {OLD}; previous: {Baseline(145.0)}{TAKEN}"
     )
     answer = client.trigger("restore_baseline").message
-    assert answer == f"baseline: {Baseline(145.0)}; previous result: {OLD}"
+    assert answer == f"baseline: {Baseline(145.0)}; previous: {OLD}"
     assert history.baseline(VALVE.name).baseline == Baseline(145.0)
 
 

@@ -176,7 +176,10 @@ def test_the_token_goes_only_to_the_address_beside_it(live, monkeypatch):
         assert "Authorization" not in headers
         assert SIGNATURE in headers
         assert receiver.requests == []
-        told = f"no token is sent to http://127.0.0.1:{other.port}, as that of the environment goes"
+        told = (
+            f"no token is sent to http://127.0.0.1:{other.port}, because the token in the "
+            "environment goes"
+        )
         assert told in node.errors
     require_no_secret(live, node)
 

@@ -53,7 +53,7 @@ def test_all_services(bench):
     client, call = bench
     assert call("fv_101", "clear") == (
         0,
-        "the buffer is empty; estimate and baseline are kept\n",
+        "the buffer is empty; the estimate and the baseline are kept\n",
         "",
     )
     code, out, err = call(NAMESPACE, "identify")
@@ -79,7 +79,10 @@ def test_all_services(bench):
 @pytest.mark.parametrize(
     ("arguments", "line"),
     [
-        (["/fv_109", "identify", "--timeout", "2"], "no identifier of /fv_109 was met within 2 s"),
+        (
+            ["/fv_109", "identify", "--timeout", "2"],
+            "no identifier of /fv_109 was found within 2 s",
+        ),
         (["/fv_101", "clear", "--timeout", "-1"], "--timeout must be above zero, got -1"),
         (["/fv_101", "save", "--fail-on", "warn"], "--fail-on: save makes no diagnosis"),
     ],
@@ -114,8 +117,8 @@ def test_the_timeout_ends_the_command_and_the_node_goes_on(busy):
     assert ended(start(busy.domain, NAMESPACE, "identify", "--timeout", "3")) == (
         2,
         "",
-        "valve_friction call: /fv_101/identifier/identify has not answered within 3 s: it goes "
-        "on; give it longer by --timeout\n",
+        "valve_friction call: /fv_101/identifier/identify has not answered within 3 s; it is "
+        "still running; allow more time with --timeout\n",
     )
     assert busy.client.trigger("identify").message.startswith(
         "an identification is already running"
@@ -148,12 +151,12 @@ def test_the_node_ends_meanwhile(busy):
     assert ended(process) == (
         2,
         "",
-        "valve_friction call: /fv_101/identifier has ended before it answered\n",
+        "valve_friction call: /fv_101/identifier ended before it answered\n",
     )
 
 
 def test_nobody_is_there(live):
     code, out, err = ended(start(live.domain, "/fv_101", "identify", "--timeout", "1"))
     assert (code, out) == (2, "")
-    assert "there is none at all: start one, or set its ROS_DOMAIN_ID" in err
+    assert "there is no identifier at all: start one, or set its ROS_DOMAIN_ID" in err
     assert err.count("\n") == 1

@@ -482,7 +482,7 @@ def test_an_alarm_of_a_valve_without_alarm_services_is_answered(plant, tab):
 
 def test_what_cannot_be_called_says_so(tab):
     page = tab.open(f"/valve?node={quote('/area_1/fv_103/identifier')}")
-    press(page, "Identify", "is not there: start the identifier of this valve")
+    press(page, "Identify", "is not available: start the identifier of this valve")
     page = tab.open(f"/valve?node={quote('/no such name!')}")
     press(page, "Identify", "cannot be called")
 

@@ -57,7 +57,7 @@ def test_baseline_needs_an_estimate(healthy):
     assert accepted.success
     result = identify(quick_record(), BENCH_VALVE)
     taken = "by the identification of 2023-11-14 22:13 UTC"
-    assert accepted.message == f"baseline: {Baseline.of(result)}; previous result: none ({taken})"
+    assert accepted.message == f"baseline: {Baseline.of(result)}; previous: none ({taken})"
     healthy = result.parameters["coulomb_friction"]
     assert healthy.interval[0] < 152.7 < healthy.interval[1]
 
@@ -304,7 +304,7 @@ def test_a_restored_baseline_brings_all_its_numbers_back(live):
     assert client.trigger("set_baseline").success
     client.identified(WEAK)
     assert client.trigger("set_baseline").success
-    assert client.next_status(lambda one: one.level == OK, "another baseline")
+    assert client.next_status(lambda one: one.level == OK, "a new baseline")
     live.kill(node)
 
     live.start_identifier({"baseline_in_alarm": True})

@@ -109,7 +109,9 @@ def test_a_history_that_cannot_be_written(live, tmp_path):
     history = HistoryFile(blocked / "history.sqlite")
     node = live.start_identifier({**PATIENT, "history_file": history.path})
     client = live.client
-    cause = f"the history is not written: {history.path}: its folder is a file: check the folder"
+    cause = (
+        f"the history is not being written: {history.path}: its folder is a file: check the folder"
+    )
     status = client.next_status()
     assert status.level == WARN
     assert status.message.startswith(cause)
@@ -118,7 +120,7 @@ def test_a_history_that_cannot_be_written(live, tmp_path):
     assert client.last_values()["estimate_valid"] == "true"
     answer = client.trigger("set_baseline")
     assert answer.success
-    assert f"lost with this node: {cause}" in answer.message
+    assert f"lost when this node stops: {cause}" in answer.message
     assert len(logged(live, node, f"]: {cause}")) == 1
 
     blocked.unlink()

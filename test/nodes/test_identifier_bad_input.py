@@ -238,7 +238,7 @@ def test_a_record_that_ended_long_ago_is_refused(live, late):
     response = client.trigger("identify")
     assert not response.success
     topic = {"pressure": "actuator_pressure", "stem": "stem_state"}[late]
-    reason = f"the record is old: its last usable sample of {topic} came 224 s ago"
+    reason = f"the record is old: its last usable sample of {topic} arrived 224 s ago"
     assert reason in response.message
     status = client.next_status(lambda one: "the record is old" in one.message, "the refusal")
     shown = values_of(status)

@@ -49,7 +49,7 @@ def warned_of(client, topic, cause):
 
 def test_nobody_publishes(client):
     for topic in (PRESSURE, STEM):
-        status = warned_of(client, topic, "nobody publishes it")
+        status = warned_of(client, topic, "it has no publisher")
         assert status.level == WARN
     values = values_of(status)
     assert values["NE 107"] == "C"
@@ -63,14 +63,14 @@ def test_wrong_type(client):
         wrong.publish(String(data="0.01"))
         assert "not sensor_msgs/msg/JointState" in status.message
         assert status.level == WARN
-        warned_of(client, PRESSURE, "nobody publishes it")
+        warned_of(client, PRESSURE, "it has no publisher")
 
 
 def test_silent_publisher(client):
     with publisher(client, FluidPressure, PRESSURE):
         status = warned_of(client, PRESSURE, "its publisher is silent")
         assert status.level == WARN
-        warned_of(client, STEM, "nobody publishes it")
+        warned_of(client, STEM, "it has no publisher")
 
 
 def sends_until_taken(client, made):
@@ -91,10 +91,10 @@ def sends_until_taken(client, made):
 def test_best_effort_and_reliable_publishers_alike(client):
     best_effort = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
     for quality in (best_effort, STREAM, best_effort):
-        warned_of(client, STEM, "nobody publishes it")
+        warned_of(client, STEM, "it has no publisher")
         with publisher(client, JointState, STEM, quality) as made:
             sends_until_taken(client, made)
-    warned_of(client, STEM, "nobody publishes it")
+    warned_of(client, STEM, "it has no publisher")
     with (
         publisher(client, JointState, STEM),
         publisher(client, JointState, STEM, best_effort) as made,

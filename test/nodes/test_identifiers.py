@@ -93,7 +93,7 @@ def test_processes_identify_and_may_die(live):
     os.kill(identifying, signal.SIGKILL)
     response = client.trigger("identify")
     assert not response.success
-    assert "has ended before its answer" in response.message
+    assert "ended before it answered" in response.message
     assert client.trigger("identify").success
 
 

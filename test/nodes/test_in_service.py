@@ -95,7 +95,7 @@ def test_a_renewed_packing_counts_anew(live, history):
     shown(client, "reversals", "7")
     answer = client.trigger("reset_usage")
     assert answer.success
-    assert "the one before, of unknown age: 0.228" in answer.message
+    assert "the previous packing, of unknown age: 0.228" in answer.message
     assert "7 reversals" in answer.message
     values = client.last_values()
     assert (values["reversals"], values["reversals in all"]) == ("0", "7")
@@ -146,7 +146,7 @@ def test_a_warning_of_a_packing_outlives_a_rest_and_a_restart(live, history):
 def test_a_machine_without_stops(live):
     live.start_identifier({"travel": ".inf"})
     values = live.client.status_values()
-    assert values["usage"] == "not counted, as the travel is not finite: set travel"
+    assert values["usage"] == "not counted, because the travel is not finite: set travel"
     assert DISTANCE not in values
 
 
@@ -159,7 +159,7 @@ def test_earlier_runs_that_cannot_be_read_at_first(live, tmp_path):
     client = live.client
     after = send(client, strokes(8))
     values = shown(client, "reversals", "7")
-    assert values["usage"] == "of this run only, as the history cannot be read"
+    assert values["usage"] == "for this run only, because the history cannot be read"
     blocked.unlink()
     after = send(client, strokes(8), after)
     after = send(client, strokes(8), after)
@@ -300,7 +300,7 @@ def test_a_renewed_packing_and_a_wrong_stamp(live):
     )
     assert number(left, "moves") >= number(before, "moves")
     answer = client.trigger("reset_usage")
-    assert "its moves count no more as evidence" in answer.message
+    assert "its moves are no longer used as evidence" in answer.message
     renewed = client.status_values(lambda status: number(values_of(status), "moves") == 0, "none")
     assert "evidence reference [N]" not in renewed
     serve(client, MOVES, 450.0)

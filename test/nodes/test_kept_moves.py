@@ -100,7 +100,7 @@ def test_a_clock_that_is_set_back_costs_no_later_move(tmp_path, ahead, restarts)
     assert len(found) == 50
     assert found[-1].end < bench.true
     assert bench.kept() == found
-    assert any("the clock was ahead" in one and "20 kept moves" in one for one in bench.log)
+    assert any("the clock was ahead" in one and "20 stored moves" in one for one in bench.log)
 
 
 def test_a_clock_that_is_not_set_yet_costs_no_kept_move(tmp_path):
@@ -137,7 +137,7 @@ def test_a_recording_that_is_played_costs_no_kept_move(tmp_path):
     bench.error = -HOUR
     bench.serve(20)
     assert len(bench.ledger.moves) == 20
-    assert "a recording that is played" in bench.ledger.problem
+    assert "when playing a recording" in bench.ledger.problem
 
 
 EXACT = IdentificationSettings(timing_uncertainty=0.005)
@@ -243,7 +243,7 @@ def test_a_thread_that_never_ends_is_overdue():
         get_parameter=lambda _: SimpleNamespace(value=100.0),
     )
     problem = Identifier.overdue(node)
-    assert problem.startswith("the thread of moves in service has not ended its work for 200 s")
+    assert problem.startswith("the thread of moves in service has been busy for 200 s")
 
 
 def test_a_change_stays_when_the_moves_before_it_have_gone(bench):

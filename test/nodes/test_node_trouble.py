@@ -112,7 +112,7 @@ class TestOneOfSeveral:
         found = self.statuses(live.client)
         status, told = found["/fv_102/identifier: friction"], "travel must be above zero, got -1"
         assert (status.level, status.hardware_id) == (b"\x02", "FV-102")
-        assert status.message == f"cannot start, so nobody watches this valve: {told}"
+        assert status.message == f"cannot start, so this valve is not monitored: {told}"
         assert values_of(status)["NE 107"] == "C"
         assert live.client.latched(DiagnosticStatus, "/fv_102/identifier/estimate") == status
         (line,) = (one for one in process.errors.splitlines() if "cannot start" in one)
@@ -147,7 +147,7 @@ class TestOneOfSeveral:
         found = self.statuses(live.client)
         status = found["/fv_102/identifier: friction"]
         assert status.level == b"\x02"
-        assert "nobody watches this valve: internal error: ZeroDivisionError" in status.message
+        assert "this valve is not monitored: internal error: ZeroDivisionError" in status.message
         self.require_others(live.client, found)
 
 
@@ -221,7 +221,7 @@ def test_a_bug_is_an_internal_error_and_the_next_record_identifies(live, tmp_pat
     assert not response.success
     words = "internal error: ZeroDivisionError: nobody foresaw it (faulty_identifier.py, line "
     assert response.message.startswith(words)
-    assert response.message.endswith("): report it, with what ~/save writes")
+    assert response.message.endswith("): report it, together with the bag that ~/save writes")
 
     status = client.next_status()
     assert status.level == ERROR

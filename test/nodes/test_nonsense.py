@@ -169,6 +169,6 @@ def test_nonsense_is_told_within_5_s_cleared_after_it_and_nothing_else_is(live, 
         lines = [line for line in node.errors.splitlines() if f"{valve}.identifier" in line]
         told = [line for line in lines if "level " not in line]
         begun = [line for line in told if "[WARN]" in line]
-        over = [line for line in told if "over after" in line]
+        over = [line for line in told if "ended after" in line]
         assert 1 <= len(over) <= 4, (valve, told)  # wrong stamps are several faults
         assert len(begun) <= len(over) + 2, (valve, told)

@@ -122,4 +122,6 @@ def test_the_trend_and_the_signature_of_the_baseline_are_those_of_the_history(li
     _, page = report(client)
     assert "Trend" not in page.said("h2")
     assert not [one for one in page.said("figcaption") if "Grey" in one]
-    assert [text for text in page.said("p") if text.startswith("no trend, as the history cannot")]
+    assert [
+        text for text in page.said("p") if text.startswith("no trend, because the history cannot")
+    ]

@@ -62,12 +62,12 @@ REFUSED = {  # node, parameters, words of the only line
     "file pressure": (
         "pressure_source",
         {**OF_A_FILE, "file_maximum": 1e5},
-        "150000 Pa breaks file_maximum (100000 Pa)",
+        "150000 Pa violates file_maximum (100000 Pa)",
     ),
     "file rate": (
         "pressure_source",
         {**OF_A_FILE, "file_rate": 2e4},
-        "25000 Pa/s breaks file_rate (20000 Pa/s)",
+        "25000 Pa/s violates file_rate (20000 Pa/s)",
     ),
     "no valves": ("identifiers", {}, "no valve is named"),
     "valve twice": ("identifiers", {"valves": "[fv_1, fv_1]"}, "valve /fv_1 is named twice"),
@@ -142,7 +142,7 @@ def test_no_place_for_the_log(ended, monkeypatch):
     monkeypatch.setenv("ROS_LOG_DIR", "/proc/nowhere")
     code, errors = ended("simulator")
     assert code == 2
-    assert errors.splitlines()[-1].endswith(": set ROS_LOG_DIR to a folder that can be written")
+    assert errors.splitlines()[-1].endswith(": set ROS_LOG_DIR to a writable folder")
 
 
 def test_without_a_home_the_folder_says_so(monkeypatch):
@@ -209,7 +209,7 @@ def test_a_file_that_nodes_of_several_packages_and_recordings_share(live, tmp_pa
     told = sorted(line for line in process.errors.splitlines() if "WARN" in line)
     assert len(told) == 2
     assert any("has the parameter 'robot_description': it is ignored" in one for one in told)
-    (columns,) = (one for one in told if "is not applied to topics" in one)
+    (columns,) = (one for one in told if "applies to tables, not to topics" in one)
     assert "columns.inverted_position and columns.opposing_pressure_column: " in columns
 
 
@@ -227,7 +227,7 @@ def test_compiled_code_without_a_place_is_said(live, tmp_path):
     )
     process = live.start("simulator", script=script)
     live.client.wait_until(lambda: "ready: " in process.errors, "the ready line")
-    assert "at each start, because no folder for it can be written" in process.errors
+    assert "at every start, because no cache folder is writable" in process.errors
     assert "set NUMBA_CACHE_DIR" in process.errors
 
 
@@ -248,7 +248,7 @@ def test_diagnostics_say_that_it_prepares(live, tmp_path):
     )
     process = live.start("identifier", {"input_timeout": 600.0}, script=script)
     status = live.client.next_status()
-    assert values_of(status)["preparing"].startswith("preparing: numeric code is compiled")
+    assert values_of(status)["preparing"].startswith("preparing: compiling numeric code")
     assert status.message.endswith(values_of(status)["preparing"])
     assert "ready: " not in process.errors
     (tmp_path / "prepared").touch()

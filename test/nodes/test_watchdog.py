@@ -95,10 +95,10 @@ def test_a_loop_that_stands_still(live, systemd, stuck):
             f"the end of {valve}'s monitoring",
         )
         assert status.name == f"/{valve}/identifier: friction"
-        assert status.message.startswith("stuck: the loop of this process has not turned for ")
+        assert status.message.startswith("stuck: the main loop of this process has not run for ")
         assert values_of(status) == {"estimate_valid": "false", "NE 107": "C"}
     assert hears_no_watchdog(client, systemd)
-    client.wait_until(lambda: "in poll_when_free" in process.errors, "the stacks")
+    client.wait_until(lambda: "in poll_when_free" in process.errors, "the stack traces")
     assert process.errors.count("most recent call first") >= 2  # all threads
 
     block.unlink()
@@ -119,7 +119,7 @@ def test_a_stuck_node_ends_all_the_same(live, stuck, number):
     process._process.send_signal(number)
     assert process.exit_code() == 1
     assert time.monotonic() - begin < WITHIN + 1.0
-    assert "is left so" in process.errors
+    assert "is abandoned" in process.errors
     assert "in poll_when_free" in process.errors
 
 

@@ -39,7 +39,11 @@ from valve_friction_ros.streams import Arrivals, Kind
 @pytest.mark.parametrize(
     ("silence", "has_arrived", "cause"),
     [
-        (5.0, False, "its publisher is silent, or still waits for a node that was killed, for up"),
+        (
+            5.0,
+            False,
+            "its publisher is silent, or it is still waiting for a node that was killed (up",
+        ),
         (25.0, False, "its publisher is silent"),
         (5.0, True, "its publisher is silent"),
     ],
@@ -306,7 +310,7 @@ def test_memory_is_bounded_where_time_stands_still(monkeypatch, stem_comes):
     held, _ = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert held < MOST
-    assert "stand still: fill header.stamp" in bench.problem
+    assert "do not advance: fill in header.stamp" in bench.problem
     bench.serve(2.0)
     assert bench.problem == ""
 
@@ -316,10 +320,10 @@ def test_memory_is_bounded_where_time_stands_still(monkeypatch, stem_comes):
     [
         ({}, 0.01, 3600, "s ahead of those of stem_state: synchronise the clocks"),
         ({}, 0.01, -3600, "s behind those of stem_state: synchronise the clocks"),
-        ({}, 50.0, 0, "50 m is no place of the stem: check command_unit"),
-        ({}, math.nan, 0, "a command holds no number"),
-        ({"travel": math.inf}, 0.01, 0, "the travel of the valve is not known: set travel"),
-        ({"travel": math.inf, "unit": "%"}, 50.0, 0, "the travel of the valve is not known"),
+        ({}, 50.0, 0, "50 m is not a valid stem position: check command_unit"),
+        ({}, math.nan, 0, "a command is not a number"),
+        ({"travel": math.inf}, 0.01, 0, "the travel of the valve is unknown: set travel"),
+        ({"travel": math.inf, "unit": "%"}, 50.0, 0, "the travel of the valve is unknown"),
     ],
 )
 def test_commands_that_cannot_be_used(monkeypatch, parameters, value, ahead, said):
@@ -344,4 +348,4 @@ def test_commands_of_which_some_can_be_used(monkeypatch):
         bench.serve(0.5)
         bench.serve(0.5, 50.0)
     assert bench.watch.findings() == []
-    assert "50 m is no place" in bench.problem
+    assert "50 m is not a valid stem position" in bench.problem

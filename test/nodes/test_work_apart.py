@@ -168,7 +168,7 @@ def test_what_cannot_be_sent_is_a_bug_and_ends_no_process(processes):
 
 def test_a_process_that_dies_costs_its_own_work_only(processes, worker, tmp_path):
     other = worker.submit(processes.done, wait_for, tmp_path / "end")
-    with pytest.raises(RefusalError, match="has ended before its answer"):
+    with pytest.raises(RefusalError, match="ended before it answered"):
         done(worker.submit(processes.done, die))
     again = worker.submit(processes.done, os.getpid)
     assert done(again) != os.getpid()

@@ -315,7 +315,7 @@ def _cells(row: HistoryEntry | KeptBaseline) -> tuple[str, ...]:
     """Return what the table shows of an identification or a baseline, after its time."""
     if isinstance(row, KeptBaseline):
         level = "" if row.level is None else row.level.name
-        change = f"{row.by}: {row.in_force or 'none'}; before: {row.replaced or 'none'}"
+        change = f"{row.by}: {row.in_force or 'none'}; previous: {row.replaced or 'none'}"
         return ("", "", "baseline", "", level, change)
     one, ratio = row.friction, row.diagnosis.ratio
     cells: tuple[str, ...] = ("", "–", "", "", "refused")

@@ -47,7 +47,7 @@ def _tell_compilation() -> None:
         def on_start(self, _: object) -> None:
             if not self.has_told:
                 self.has_told = True
-                _LOG.info("numeric code is compiled, once after an installation: about a minute")
+                _LOG.info("compiling numeric code, once after installation: about a minute")
 
         def on_end(self, _: object) -> None:
             """Nothing is told."""

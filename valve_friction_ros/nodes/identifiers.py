@@ -56,7 +56,7 @@ class _FaultyValve(PolledNode):
         overrides = parameter_overrides(self)
         given, is_asked = overrides.get("valve_tag"), overrides.get("estimate_topic")
         self._tag = str(given.value) if given is not None and given.value else place.strip("/")
-        self._problem = f"cannot start, so nobody watches this valve: {problem}"
+        self._problem = f"cannot start, so this valve is not monitored: {problem}"
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self._estimate = EstimateTopic(self, is_asked is None or is_asked.value)
         self.create_timer(1.0, self._tell, clock=Clock(clock_type=ClockType.STEADY_TIME))
@@ -77,7 +77,7 @@ def _places(valves: Sequence[str]) -> list[str]:
     """Return the namespaces of valves by their names."""
     places = [f"/{valve.strip('/')}" for valve in valves if valve]
     if not places:
-        raise ValueError("no valve is named: give the parameter valves, such as [fv_101, fv_102]")
+        raise ValueError("no valve is named: set the parameter valves, such as [fv_101, fv_102]")
     repeated = {place for place in places if places.count(place) > 1}
     if repeated:
         raise ValueError(f"valve {min(repeated)} is named twice: name each valve once")
@@ -125,15 +125,15 @@ def _identifiers_of_valves(
         yield identifier
         if identifier.get_namespace() != place:
             raise ValueError(
-                f"the namespace {place} is remapped to {identifier.get_namespace()}: start without "
-                "__ns, the valves have namespaces of their own"
+                f"the namespace {place} is remapped to {identifier.get_namespace()}: start "
+                "without __ns, because each valve has its own namespace"
             )
     lines = [f"{place}/identifier: {problem}" for place, problem in faults.items()]
     if len(faults) == len(places):
         raise ValueError("; ".join(lines))
     for line in lines:
         host.get_logger().error(
-            f"cannot start {line}: correct it and start again; the other valves are watched"
+            f"cannot start {line}: correct it and start again; the other valves are monitored"
         )
 
 

@@ -65,8 +65,8 @@ def pressure_from_file(path: Path, values: Mapping[str, Any]) -> SampledPressure
     ):
         if breaks:
             raise ValueError(
-                f"{path}: {found:.6g} {unit} breaks {name} ({values[name]:.6g} {unit}): nothing is "
-                "played; plan it again, or change the limit"
+                f"{path}: {found:.6g} {unit} violates {name} ({values[name]:.6g} {unit}): nothing "
+                "is played; plan the test again, or change the limit"
             )
     return signal
 
@@ -120,7 +120,7 @@ class PressureSource(PacedNode):
         if not self._jitter < self._period / 2:
             raise ValueError(
                 f"time_jitter ({self._jitter:g} s) must be below half of the sampling period "
-                f"({self._period:g} s): stamps would not rise"
+                f"({self._period:g} s): time stamps would not increase"
             )
         self._tick = max(self._period / self._speed, _TICK)
         self._most = _CATCHING_UP * math.ceil(self._tick * self._speed / self._period)
@@ -134,7 +134,7 @@ class PressureSource(PacedNode):
         self._publisher = self.create_publisher(
             FluidPressure, "actuator_pressure", stream(), qos_overriding_options=qos_overrides()
         )
-        self.get_logger().info(f"ready: publishes {self._publisher.topic_name}")
+        self.get_logger().info(f"ready: publishing {self._publisher.topic_name}")
 
     def step(self) -> float:
         """Publish the samples whose time has come; return the time of the next step."""

@@ -173,16 +173,16 @@ class TriggerCall:
                 self._future = self._client.call_async(request)
             elif not is_there and waited > self._meeting:
                 raise UnansweredError(
-                    f"{self._name} is not there: start the identifier of this valve"
+                    f"{self._name} is not available: start the identifier of this valve"
                 )
         elif self._future.done():
             self.answer = self._future.result()
             return True
         elif not is_there:
-            raise UnansweredError(f"{self._identifier} has ended before it answered")
+            raise UnansweredError(f"{self._identifier} ended before it answered")
         if waited > self._patience:
             raise LateError(
-                f"{self._name} has not answered within {self._patience:g} s: it goes on"
+                f"{self._name} has not answered within {self._patience:g} s; it is still running"
             )
         return False
 
@@ -287,9 +287,9 @@ class Caller:
                 name.removesuffix("/identifier") or "/" for name in self.identifiers()
             )
             domain = os.environ.get("ROS_DOMAIN_ID", "0")
-            there = f"there are {known}" if known else "there is none at all: start one"
+            there = f"there are {known}" if known else "there is no identifier at all: start one"
             raise RefusalError(
-                f"no identifier of {wanted} was met within {patience:g} s in the ROS domain "
+                f"no identifier of {wanted} was found within {patience:g} s in the ROS domain "
                 f"{domain}; {there}, or set its ROS_DOMAIN_ID"
             )
         return next(iter(found()), wanted)
@@ -320,7 +320,7 @@ class Caller:
             if not self._wait(has_answered, 2 * patience):  # its own patience ends before
                 return None
         except LateError as error:
-            raise RefusalError(f"{error}; give it longer by --timeout") from None
+            raise RefusalError(f"{error}; allow more time with --timeout") from None
         except UnansweredError as error:
             raise RefusalError(str(error)) from None
         finally:

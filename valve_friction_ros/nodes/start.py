@@ -49,11 +49,11 @@ def _help_text(name: str, purpose: str) -> str:
         "",
         purpose,
         "",
-        "Ctrl-C stops it. Parameters and their defaults, as they are written in a FILE:",
+        "Ctrl-C stops it. Parameters and their defaults, as written in a FILE:",
     ]
     for one in NODES[name]:
         if one.default is None:
-            taken = "" if one.assumed is None else f"; {one.assumed:g} is assumed, and said so"
+            taken = "" if one.assumed is None else f"; {one.assumed:g} is assumed and reported"
             lines.append(f"  # {one.name}:  # {one.description}; unset{taken}")
             continue
         default = yaml.safe_dump(one.default, default_flow_style=True).splitlines()[0]

@@ -199,7 +199,9 @@ class ServiceCalls:
         """Give up the calls under way, as the node rests; in the node's thread."""
         self.step(node)
         for call, answer in self._under_way:
-            answer.set_result(Answer(False, "the dashboard rests: ask again when it is active"))
+            answer.set_result(
+                Answer(False, "the dashboard is inactive: try again when it is active")
+            )
             call.close()
         self._under_way = []
 

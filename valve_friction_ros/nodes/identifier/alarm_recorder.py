@@ -279,7 +279,7 @@ class AlarmRecorder:
                 write(page)
                 if _size_of(path) > room:
                     page.unlink()
-                    return f"{page} has no room in alarm_megabytes: raise it"
+                    return f"{page} does not fit into alarm_megabytes: increase it"
                 remove_oldest(path.parent, valve, most, room, new=path)
             except OSError as error:
                 return f"{page} was not written: {error.strerror or error}"

@@ -82,7 +82,7 @@ class FaultLog:
             again = self._repeated.pop(what, 0)
             lasted = self._seen.pop(what) - self._begun.pop(what)
             times = f", {again} times more" if again else ""
-            self._log.info(f"over after {lasted:.0f} s{times}: {what}")
+            self._log.info(f"ended after {lasted:.0f} s{times}: {what}")
 
     def note(self, what: Statement, statement: Statement, now: float) -> None:
         """Take what happens at an instant; a repetition soon after it belongs to the same fault."""
@@ -130,8 +130,8 @@ class Alerts:
             and (all_of := Secrets.from_environment()).going_to(webhook) != all_of
         ):
             node.get_logger().warning(
-                f"no token is sent to {webhook}, as that of the environment goes only to the "
-                f"address of {URL_VARIABLE}: name the address there, not by webhook_url"
+                f"no token is sent to {webhook}, because the token in the environment goes only "
+                f"to the address in {URL_VARIABLE}: set the address there instead of webhook_url"
             )
         self._kept = history.told_level()
         self._told = level if self._kept is None else self._kept

@@ -84,7 +84,7 @@ class BaselineInForce:
         if given is not None:
             source = f"from the parameter {_PARAMETER}"
             if kept is not None:
-                source += f"; the history's is not used: {_described_with_date(kept)}"
+                source += f"; the baseline in the history is not used: {_described_with_date(kept)}"
             log.info(f"baseline {given}, {source}")
         elif kept is not None:
             self._put_in_force(kept.baseline)
@@ -131,11 +131,13 @@ class BaselineInForce:
         """
         last = self._history.baseline
         if last is None or last.by == _RESTORE:
-            raise RefusalError("there is no ~/set_baseline to undo: call it to set a baseline")
+            raise RefusalError(
+                "there is no ~/set_baseline to undo: call ~/set_baseline to set a baseline"
+            )
         if last.baseline != self._monitor.baseline:
             raise RefusalError(
-                f"the baseline of the last ~/set_baseline ({last.baseline}) is not in force any "
-                f"more: set {_PARAMETER}, or call ~/set_baseline"
+                f"the baseline of the last ~/set_baseline ({last.baseline}) is no longer in "
+                f"force: set {_PARAMETER}, or call ~/set_baseline"
             )
         self._require_no_alarm()
         return await self._change(self._history.replaced_now(last, _RESTORE, self._level()))
@@ -175,9 +177,9 @@ class BaselineInForce:
         worst = self._forbidding()
         if worst is not None:
             raise BaselineRefusalError(
-                f"the valve is in {worst.level.name}, which another baseline may hide "
-                f"({worst.message}): repair it and identify again, or set "
-                "baseline_in_alarm to true if the valve is healthy, and call again",
+                f"the valve is in {worst.level.name}, which a new baseline could hide "
+                f"({worst.message}): repair it and identify again; if the valve is healthy, set "
+                "baseline_in_alarm to true and call again",
                 BaselineLack("valve", Lack.HEALTH),
             )
 
@@ -185,7 +187,7 @@ class BaselineInForce:
         self._put_in_force(kept.in_force)
         await self._history.keep_baseline(kept)
         answer = (
-            f"baseline: {kept.in_force or 'none'}; before: {kept.replaced or 'none'}"
+            f"baseline: {kept.in_force or 'none'}; previous: {kept.replaced or 'none'}"
             f"{self._history.reservation}{source}"
         )
         if kept.in_force is not None and (remark := kept.in_force.remark):

@@ -138,9 +138,9 @@ class MoveLedger:
         if self._left_in_a_row < _TOLD:
             return ""
         return (
-            f"the latest {self._left_in_a_row} moves in service are left out of the evidence: "
-            f"their stamps lie {self._problem}: check the clocks of the sensors and of this "
-            "machine, and give a recording that is played a history_file of its own"
+            f"the latest {self._left_in_a_row} moves in service are left out of the evidence "
+            f"because their time stamps are {self._problem}: check the clocks of the sensors and "
+            "of this machine, and use a separate history_file when playing a recording"
         )
 
     def _drop_those_ahead(self) -> None:
@@ -154,8 +154,8 @@ class MoveLedger:
         valve = self._history.valve
         self._history.keep_soon(lambda file: database.forget_moves_after(file, valve, begin))
         self._node.get_logger().warning(
-            f"the clock was ahead, and has been set back: {count - len(self._moves)} kept moves in "
-            "service with stamps of a time to come are dropped"
+            f"the clock was ahead and has been set back: {count - len(self._moves)} stored moves "
+            "in service with time stamps in the future are dropped"
         )
         self.left_out -= len(behind)
         self.add(behind)
@@ -166,9 +166,9 @@ class MoveLedger:
         self._problem = problem
         if self.left_out == 1:
             self._node.get_logger().warning(
-                f"a move in service is left out of the evidence: its stamps lie {problem}; "
-                "evidence left_out counts them: check the clocks of the sensors and of this "
-                "machine, or set use_sim_time where a recording is played"
+                "a move in service is left out of the evidence because its time stamps are "
+                f"{problem} (counted in evidence left_out): check the clocks of the sensors and "
+                "of this machine, or set use_sim_time when playing a recording"
             )
 
     def refer(self, evidence: Evidence) -> None:
@@ -279,7 +279,7 @@ class EvidenceWatch:
     def source(self) -> str:
         """What the evidence is of, in words."""
         return (
-            f"by {self._evidence.moves} moves in service since {utc_second(self._evidence.since)}"
+            f"from {self._evidence.moves} moves in service since {utc_second(self._evidence.since)}"
         )
 
     @property

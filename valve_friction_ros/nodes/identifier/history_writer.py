@@ -126,7 +126,9 @@ class _HistorySending:
         if server is None:
             return
         if path is None:
-            raise ValueError("history_url needs history_file, where rows wait for the server")
+            raise ValueError(
+                "history_url requires history_file, which holds the rows waiting for the server"
+            )
         self._sender = database.sender_of(path, server)
 
     def take(self) -> None:
@@ -135,8 +137,8 @@ class _HistorySending:
             self._untaken = self._sender.take(self._valve)
         if self._untaken is not None:
             self._node.get_logger().warning(
-                "what another machine may have kept of this valve was not taken from the server, "
-                f"and is at the next start: {self._untaken}"
+                "data that another machine may have stored for this valve was not read from the "
+                f"server; the next start tries again: {self._untaken}"
             )
 
     def follow(self) -> None:
@@ -190,8 +192,8 @@ class _HistoryGuard:
         if time.monotonic() - self._refused_since < _HANDOVER:
             return None
         return (
-            f"another node keeps the history of {self._valve} in {self._path}: end one of them, "
-            "or name another history_file or namespace"
+            f"another node writes the history of {self._valve} to {self._path}: stop one of them, "
+            "or use another history_file or namespace"
         )
 
     @property
@@ -244,7 +246,7 @@ class HistoryWriter:
             self._file = database.HistoryFile(Path(path).expanduser()) if path else None
         except RuntimeError as error:  # pathlib's
             raise ValueError(
-                f"history_file {path}: {error} Set HOME or ROS_HOME, or name another file"
+                f"history_file {path}: {error} Set HOME or ROS_HOME, or choose another file"
             ) from None
         self._guard = None
         if self._file is not None:
@@ -269,11 +271,11 @@ class HistoryWriter:
         """Why the latest writing failed, or has not ended; empty if it did not."""
         problem = self._problem
         if (busy := self._writer.busy_for()) > _LONGEST:
-            problem = f"{self.path} has not answered for {busy:.0f} s"
+            problem = f"{self.path} has not responded for {busy:.0f} s"
         if not problem:
             return []
         lost = self._waiting.given_up
-        return [f"the history is not written: {problem}{f'; given up: {lost}' * bool(lost)}"]
+        return [f"the history is not being written: {problem}{f'; lost: {lost}' * bool(lost)}"]
 
     @property
     def conflict(self) -> str | None:
@@ -290,13 +292,16 @@ class HistoryWriter:
         """Return what the diagnostics say: that nothing is kept, or how it goes to a server."""
         if self._file is not None:
             return self._sending.values()
-        lost = "none, as history_file is empty: diagnosis and baseline end with this node"
+        lost = (
+            "none, because history_file is empty: diagnosis and baseline are lost when this "
+            "node stops"
+        )
         return {"history": lost}
 
     @property
     def reservation(self) -> str:
         """Addition to the answer that something was kept; empty if it is in the file."""
-        return "".join(f", but it is lost with this node: {one}" for one in self.problems)
+        return "".join(f", but it is lost when this node stops: {one}" for one in self.problems)
 
     def read(self) -> ValveHistory | None:
         """Read the history of the valve, in any thread; None without a file or entries.
@@ -508,7 +513,8 @@ class HistoryWriter:
             if lost := self._waiting.given_up:
                 self._waiting.forget_given_up()
                 self._node.get_logger().warning(
-                    f"the history is written again, but too much waited: it lacks {lost}"
+                    f"the history is being written again, but the queue overflowed: {lost} are "
+                    "missing"
                 )
         except (HistoryError, InternalError) as error:
             self._complain(error)
@@ -534,13 +540,13 @@ class HistoryWriter:
     def _keep_again(self, file: "HistoryFile") -> None:
         """Keep the baseline in force where the file was removed, or another one has none."""
         name, kept = self.valve.name, self.baseline
-        told = "its baseline counts after a restart"
+        told = "its baseline applies after a restart"
         if kept is not None and not (file.path.exists() and file.baselines(name)):
             file.set_baseline(self.valve, kept)
-            told = "the baseline in force is kept again"
+            told = "the baseline in force is stored again"
         self._node.get_logger().warning(
-            f"{file.path} was removed or replaced while the node runs: what it held of the valve "
-            f"is gone; {told}"
+            f"{file.path} was removed or replaced while the node was running: its data on the "
+            f"valve is lost; {told}"
         )
 
     def _complain(self, error: HistoryError | InternalError) -> None:

@@ -306,8 +306,8 @@ class Identifier(ManagedNode):
         if busy <= limit:
             return None
         return (
-            f"the thread of {thread} has not ended its work for {busy:.0f} s, beyond "
-            f"identification_limit ({limit:g} s): restart the node"
+            f"the thread of {thread} has been busy for {busy:.0f} s, beyond identification_limit "
+            f"({limit:g} s): restart the node"
         )
 
     def stuck_status(self, problem: str) -> DiagnosticStatus:
@@ -426,7 +426,7 @@ class Identifier(ManagedNode):
         self._inputs.take(is_all=True)
         self._monitor.buffer.clear(said(Code.CLEARED_ON_REQUEST))
         self._evidence.forget_samples()
-        return "the buffer is empty; estimate and baseline are kept"
+        return "the buffer is empty; the estimate and the baseline are kept"
 
     async def _reset_usage(self) -> str:
         self._inputs.take(is_all=True)
@@ -438,7 +438,10 @@ class Identifier(ManagedNode):
     def _silence(self) -> list[str]:
         clock = self.get_clock()
         if clock.ros_time_is_active and not clock.now().nanoseconds:
-            return ["no time on /clock, though use_sim_time is set: play a clock, or unset it"]
+            return [
+                "no time on /clock although use_sim_time is set: publish a clock, or unset "
+                "use_sim_time"
+            ]
         return self._inputs.problems(self.get_parameter("input_timeout").value)
 
     def _faults(self) -> dict[Statement, Statement]:

@@ -127,7 +127,7 @@ class ReportWriter:
         if monitor.refusal is not None:
             notes.append(f"a later record was refused: {monitor.refusal}")
         if (diagnosis := monitor.diagnosis()).alarm is not None:
-            notes.append(f"an alarm of an earlier record stands: {diagnosis.message}")
+            notes.append(f"an alarm from an earlier record is still active: {diagnosis.message}")
         facts = {
             "name": history.valve.tag or self._node.get_name(),
             "source": f"node {self._node.get_fully_qualified_name()}, "
@@ -149,7 +149,7 @@ class ReportWriter:
             try:
                 before = history.read()
             except HistoryError as error:
-                unread = [f"no trend, as the history cannot be read: {error}"]
+                unread = [f"no trend, because the history cannot be read: {error}"]
             told = facts | {"history": before, "notes": (*notes, *unread)}
             # Its libraries cost memory, and most nodes never report.
             room = "valve_friction_ros.reports"

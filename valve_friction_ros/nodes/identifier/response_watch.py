@@ -134,8 +134,8 @@ class ResponseWatch:
             self._standing = ""
             if not elapsed:
                 self._standing = (
-                    f"the stamps of {self._held} samples stand still: fill header.stamp, or let "
-                    "the simulated time go on"
+                    f"the time stamps of {self._held} samples do not advance: fill in "
+                    "header.stamp, or let simulated time run"
                 )
             self._work()
 
@@ -156,16 +156,16 @@ class ResponseWatch:
         metres = given.values
         good: NDArray[np.bool_] = np.zeros(metres.size, np.bool_)
         if not math.isfinite(travel):
-            wrong = "the travel of the valve is not known: set travel"
+            wrong = "the travel of the valve is unknown: set travel"
         elif not good.size:
-            wrong = "a command holds no number"
+            wrong = "a command is not a number"
         else:
             metres = metres * (travel / 100 if unit == "%" else 1.0)
             # Positioners take a little more than 0 to 100 %.
             good = np.abs(metres - travel / 2) <= travel
             if not good.all():
                 place = float(given.values[~good][0])
-                wrong = f"{place:g} {unit} is no place of the stem: check command_unit"
+                wrong = f"{place:g} {unit} is not a valid stem position: check command_unit"
         if good.any():
             self._commands.append(Samples(given.stamps[good], metres[good]))
             self._held += int(good.sum())
@@ -270,8 +270,8 @@ def _clock_problem(offset: float) -> str:
         return ""
     side = "ahead of" if offset > 0 else "behind"
     return (
-        f"its stamps are {abs(offset):.4g} s {side} those of stem_state: synchronise the clocks, "
-        "and fill header.stamp"
+        f"its time stamps are {abs(offset):.4g} s {side} those of stem_state: synchronise the "
+        "clocks, and fill in header.stamp"
     )
 
 

@@ -113,7 +113,7 @@ class UsageWatch:
         if time.monotonic() - self._written_at >= _WRITE_EVERY and self._unwritten:
             self._keep()
         if self._counter is None:
-            return {"usage": "not counted, as the travel is not finite: set travel"}
+            return {"usage": "not counted, because the travel is not finite: set travel"}
         used, everything = self._since_renewal, self._total
         at_travel = self._node.get_parameter("air_to").value == "close"
         values = {
@@ -132,10 +132,10 @@ class UsageWatch:
         }
         if self._counter.is_raised:
             values["counting_dead_band reason"] = (
-                "above counting_dead_band, as the sensor's noise or resolution demands"
+                "above counting_dead_band, because of the noise or resolution of the sensor"
             )
         if self._earlier is None and self._history.path is not None:
-            values["usage"] = "of this run only, as the history cannot be read"
+            values["usage"] = "for this run only, because the history cannot be read"
         if self._pace is not None:
             values["travelled_distance pace [m/day]"] = number_text(self._pace.distance)
             values["reversals pace [1/day]"] = number_text(self._pace.reversals)
@@ -164,11 +164,11 @@ class UsageWatch:
 
         await self._history.keep_change(renew)
         answer = (
-            f"the packing counts from {utc_day(now)} on; the one before, "
+            f"the packing is counted from {utc_day(now)}; the previous packing, "
             f"{f'of {utc_day(since)}' if since else 'of unknown age'}: {used.distance:.6g} m of "
             f"travel, {used.reversals} reversals, {used.breakaways} breakaways in "
-            f"{used.time_watched / 3600e9:.3g} h of watching; its moves count no more as evidence"
-            f"{self._history.reservation}"
+            f"{used.time_watched / 3600e9:.3g} h monitored; its moves are no longer used as "
+            f"evidence{self._history.reservation}"
         )
         self._node.get_logger().info(answer)
         return answer

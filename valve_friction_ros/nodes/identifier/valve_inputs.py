@@ -61,14 +61,17 @@ class _Input(PolledSubscription):
         published = losses.recently_lost + losses.recently_taken
         return (
             f"{100 * losses.share:.2g} % of the messages on {self.watch.topic} were lost in the "
-            f"last minute ({losses.recently_lost} of {published}): they come faster than this "
-            "process takes them, or the network drops them: publish fewer, or blocks on ~/samples"
+            f"last minute ({losses.recently_lost} of {published}): they arrive faster than this "
+            "process can take them, or the network drops them; publish fewer messages, or blocks "
+            "on ~/samples"
         )
 
     def follow(self) -> None:
         if self.watch.silence() > _SILENCE and self.follow_publishers():
             quality = self.quality.reliability.name.lower()
-            self._node.get_logger().info(f"{self.watch.topic} is taken as {quality}, as published")
+            self._node.get_logger().info(
+                f"{self.watch.topic} is received as {quality}, as published"
+            )
 
 
 class ValveInputs:

@@ -162,9 +162,9 @@ class Identification:
             age = (now - came) / 1e9
             if stamp is not None and age > longest:
                 raise RefusedRecordError(
-                    f"the record is old: its last usable sample of {name} came {age:.0f} s ago, "
-                    f"and window and input_timeout allow {longest:g} s: check the source of {name}"
-                    ", or set a longer window for a sensor that reports rarely",
+                    f"the record is old: its last usable sample of {name} arrived {age:.0f} s "
+                    f"ago, but window and input_timeout allow {longest:g} s: check the source of "
+                    f"{name}, or set a longer window for a sensor that reports rarely",
                     {},
                 )
 
@@ -180,7 +180,7 @@ class Identification:
         Raises RefusalError if an identification is running.
         """
         if self._is_running:
-            raise RefusalError("an identification is already running: wait for it")
+            raise RefusalError("an identification is already running: wait until it finishes")
         self._until = self._monitor.buffer.newest_stamp
         return self._monitor.input()
 

@@ -55,7 +55,7 @@ class ManagedNode(LifecycleNodeMixin, PolledNode):
         """
         if self.get_parameter("lifecycle").value:
             LifecycleNodeMixin.__init__(self, callback_group=self._services_in_turns)
-            self.get_logger().info("unconfigured: waits for its life cycle's first transition")
+            self.get_logger().info("unconfigured: waiting for its first life-cycle transition")
             return
         try:
             self._configure()

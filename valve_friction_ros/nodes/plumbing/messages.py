@@ -58,7 +58,7 @@ def rows_of(messages: Sequence[Float64MultiArray]) -> Arrivals:
     """
     tables, labels = zip(*map(_table_of, messages), strict=True)
     if any(one != labels[0] for one in labels):
-        raise ValueError("the columns are not the same in all blocks")
+        raise ValueError("the columns differ between blocks")
     return rows_arrived(np.concatenate(tables), labels[0])
 
 
@@ -145,7 +145,7 @@ def _position_layout(message: bytes, joint: str) -> _Layout:
     names = [reader.string() for _ in range(reader.count())]
     index = joint_index(names, reader.count(), joint)
     if index is None:
-        raise ValueError("no position of the joint")
+        raise ValueError("no position for the joint")
     return reader.double(index)
 
 

@@ -50,7 +50,8 @@ def folder_of(given: str, usual: str) -> Path:
     folder = (home / path).resolve()
     if not path.is_absolute() and not folder.is_relative_to(home):
         raise ValueError(
-            f"the folder {given} leads out of {home}, where relative ones lie: write its whole path"
+            f"the folder {given} leads out of {home}, the base of relative paths: give its full "
+            "path"
         )
     return folder
 
@@ -96,8 +97,8 @@ class OutputFolder:
             self._folder.mkdir(parents=True, exist_ok=True)
             if (now := self._folder.resolve()) != self._folder:
                 raise RefusalError(
-                    f"cannot write {self._content} into {self._folder}: since the start a link "
-                    f"leads from there to {now}: remove it, or restart the node"
+                    f"cannot write {self._content} into {self._folder}: it has become a link to "
+                    f"{now} since the start: remove the link, or restart the node"
                 )
             yield self._folder
         except OSError as error:
@@ -181,6 +182,7 @@ def require_room(folder: Path, valve: str, room: float, is_there: bool = False) 
     if taken > room or (taken == room and not is_there):
         with_it = " with this one" if is_there else ""
         raise RefusalError(
-            f"no room: {valve} takes {taken / 1e6:.3g} MB in {folder}{with_it}, and save_megabytes "
-            f"is {room / 1e6:g}: move files away, or restart the node with more"
+            f"no space left: {valve} uses {taken / 1e6:.3g} MB in {folder}{with_it}, and "
+            f"save_megabytes is {room / 1e6:g}: move files away, or restart the node with a "
+            "larger limit"
         )

@@ -119,9 +119,9 @@ def warn_of_columns(node: Node) -> None:
     overrides = parameter_overrides(node)
     if found := [key for key in _TURNS_SIGNALS if key in overrides and overrides[key].value]:
         node.get_logger().warning(
-            f"{' and '.join(found)}: the section columns is of tables and is not applied to "
-            "topics: publish the position as it rises with the pressure, and the pressure less "
-            "opposing_area_ratio times the opposing one"
+            f"{' and '.join(found)}: the section columns applies to tables, not to topics: "
+            "publish the position so that it rises with the pressure, and publish the pressure "
+            "less opposing_area_ratio times the opposing pressure"
         )
 
 

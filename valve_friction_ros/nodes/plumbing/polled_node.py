@@ -449,8 +449,8 @@ def create_service(
         try:
             if not node.is_active:
                 raise RefusalError(
-                    f"{node.get_fully_qualified_name()} is inactive: activate it, as by "
-                    f"`ros2 lifecycle set {node.get_fully_qualified_name()} activate`"
+                    f"{node.get_fully_qualified_name()} is inactive: activate it, for example "
+                    f"with `ros2 lifecycle set {node.get_fully_qualified_name()} activate`"
                 )
             with bugs_reported(node):
                 response.message = await work(request)

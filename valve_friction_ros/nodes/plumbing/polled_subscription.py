@@ -80,14 +80,14 @@ class InputWatch:
         publishers = self._node.get_publishers_info_by_topic(self.topic)
         others = sorted({info.topic_type for info in publishers} - {self._type})
         if not publishers:
-            cause = "nobody publishes it"
+            cause = "it has no publisher"
         elif others:
             cause = f"it is published as {', '.join(others)}, not {self._type}"
         else:
             cause = "its publisher is silent"
             if not self._has_arrived and silence < _LEASE:
                 cause += (
-                    f", or still waits for a node that was killed, for up to {_LEASE:g} s: wait"
+                    f", or it is still waiting for a node that was killed (up to {_LEASE:g} s: wait"
                 )
         return f"no data on {self.topic} for {silence:.1f} s: {cause}"
 

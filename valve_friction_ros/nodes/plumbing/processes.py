@@ -136,8 +136,8 @@ class Processes(ThisProcess):
         except (EOFError, OSError, pickle.UnpicklingError):
             self._end(child)
             raise RefusalError(
-                "the process of the identification has ended before its answer, as the system ends "
-                "one when the memory is used up: identify again"
+                "the identification process ended before it answered, possibly because the system "
+                "ran out of memory: identify again"
             ) from None
         except BaseException:
             self._end(child)

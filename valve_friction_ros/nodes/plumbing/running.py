@@ -109,8 +109,8 @@ class _Watchdog(Companion):
 
     def _say(self, idle: float) -> None:
         problem = (
-            f"stuck: the loop of this process has not turned for {idle:.0f} s, so nothing is "
-            "taken, identified or answered: restart it, and report the stacks in its log"
+            f"stuck: the main loop of this process has not run for {idle:.0f} s, so nothing is "
+            "received, identified or answered: restart it, and report the stack traces in its log"
         )
         if self._publisher is not None:
             message = DiagnosticArray(
@@ -261,7 +261,7 @@ class StopRequest(Companion):
         if self.has_ended.wait(_PATIENCE) or not number:
             return
         if not self.is_followed:
-            line = f"stuck: it did not end within {_PATIENCE:g} s of the request, and is left so"
+            line = f"stuck: it did not stop within {_PATIENCE:g} s of the request, and is abandoned"
             print(line, file=sys.stderr)  # noqa: T201
             faulthandler.dump_traceback()
         os._exit(0 if self.is_followed else 1)
@@ -275,7 +275,7 @@ def cannot_start(error: Exception) -> int:
     """Write what was wrong in one line, and return the exit code."""
     cause = " ".join(str(error).split())
     if "log directory" in cause or "logging directory" in cause:  # rcl's words
-        cause += ": set ROS_LOG_DIR to a folder that can be written"
+        cause += ": set ROS_LOG_DIR to a writable folder"
     print(f"cannot start: {cause}", file=sys.stderr)  # noqa: T201
     return 2
 

@@ -42,7 +42,9 @@ def _internal_error(bug: Exception) -> InternalError:
         file, line = place.filename, place.lineno or 0
     words = " ".join(f"{type(bug).__name__}: {bug}".split())
     where = f"{Path(file).name}, line {line}"
-    return InternalError(f"internal error: {words} ({where}): report it, with what ~/save writes")
+    return InternalError(
+        f"internal error: {words} ({where}): report it, together with the bag that ~/save writes"
+    )
 
 
 @contextlib.contextmanager
@@ -179,10 +181,10 @@ class Readiness:
         if not self._worker.is_preparing:
             return None
         if kernels_are_cached():
-            return "preparing: numeric code is compiled, once after an installation"
+            return "preparing: compiling numeric code, once after installation"
         return (
-            "preparing: numeric code is compiled, at each start, because no folder for it can be "
-            "written: set NUMBA_CACHE_DIR to one"
+            "preparing: compiling numeric code at every start, because no cache folder is "
+            "writable: set NUMBA_CACHE_DIR to a writable folder"
         )
 
     @property
