@@ -168,7 +168,7 @@ def test_a_model_that_does_not_describe_the_valve_comes_first(with_friction, ide
     assert diagnosis_sentence(excessive).startswith(f"{doubt}is excessive, ")
 
 
-FRICTION = "Friction against its baseline"
+FRICTION = "Friction compared with its baseline"
 
 
 def section(page, title):

@@ -167,10 +167,10 @@ def test_what_nobody_said_is_called_assumed(command):
         ({"travel": "long"}, "--travel: 'long' is not a number with a unit, such as 28.6 mm\n"),
         ({"area": "690 m2"}, "cm² or in² read as m²?"),
         ({"travel": "28 m"}, "mm read as m?"),
-        ({"spring_range": "1..0.2 bar"}, "the range must rise"),
+        ({"spring_range": "1..0.2 bar"}, "give the range from low to high"),
         ({"spring_range": "1 bar"}, "is not a range with a unit"),
         ({"acting": "triple"}, "choose single or double"),
-        ({"opposing_area": "1 cm2"}, "is of a double-acting actuator"),
+        ({"opposing_area": "1 cm2"}, "belongs to a double-acting actuator"),
         ({"time_zone": "Mars"}, "unknown time_zone 'Mars'"),
     ],
 )
@@ -189,7 +189,7 @@ def test_nothing_is_replaced_unasked(command, described, tmp_path):
     described("--yes", *given)
     code, _, err = command("describe-valve", "--yes", *given, "--output", tmp_path / "fv_101.yaml")
     assert code == 2
-    assert err.endswith("it exists: give another name, or --replace\n")
+    assert err.endswith("it exists already: give another name, or --replace\n")
     described("--yes", "--replace", *given)
 
 

@@ -93,7 +93,7 @@ def test_a_killed_worker_is_a_row(address, folder, arguments, command, monkeypat
     rows = rows_of(arguments[2])
     assert {name for name, row in rows.items() if row["error"]} == {"deadly.csv", "broken.csv"}
     assert "the process of its worker died 1 times" in rows["deadly.csv"]["error"]
-    assert rows["broken.csv"]["error"].startswith("there is only one column")
+    assert rows["broken.csv"]["error"].startswith("only one column")
     code, _, err = command("identify-folder", *arguments, "--scheduler", address)
     assert "6 recordings: 6 done before, 0 to do" in err
     code, _, err = command("identify-folder", *arguments, "--jobs", "1", "--retry-failed")
@@ -118,7 +118,7 @@ def test_interrupted_and_resumed(address, folder, arguments, command):
     process.send_signal(signal.SIGINT)
     out, err = process.communicate(timeout=PATIENCE)
     assert (process.returncode, out) == (130, "")
-    assert err.splitlines()[-1].endswith("the same command goes on from there")
+    assert err.splitlines()[-1].endswith("run the same command to continue")
     assert "interrupted with 2 of 4 recordings" in err
     (folder / "go").touch()
     code, _, err = command("identify-folder", *arguments, "--scheduler", address)
@@ -196,7 +196,10 @@ def test_refused_at_once(arguments, command, monkeypatch):
     monkeypatch.setattr(cluster, "_AWAY", 0.5)
     for words, message in (
         (("--scheduler", "tcp://127.0.0.1:9"), "tcp://127.0.0.1:9: no scheduler answers: "),
-        (("--scheduler", "tcp://127.0.0.1:9", "--jobs", "2"), "--jobs is of this machine: "),
+        (
+            ("--scheduler", "tcp://127.0.0.1:9", "--jobs", "2"),
+            "--jobs applies to this machine only: ",
+        ),
     ):
         code, out, err = command("identify-folder", *arguments, *words)
         assert (code, out) == (2, "")

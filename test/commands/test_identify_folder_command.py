@@ -370,7 +370,7 @@ def test_valve_files_beside_recordings(folder, texts, noisy, tmp_path, bench_yam
         (["--output", "nowhere/friction.csv"], "there is no folder nowhere"),
         (["--order", "1"], "order must be at least 2"),
         (["--valve", "nowhere.yaml"], "nowhere.yaml: cannot be read"),
-        ([], "there are no tables (CSV, xlsx, Parquet) and no bags in it"),
+        ([], "contains no tables (CSV, xlsx, Parquet) and no bags"),
     ],
 )
 def test_bad_arguments_are_refused_at_once(arguments, output, capsys, extra, message):

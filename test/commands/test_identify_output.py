@@ -239,8 +239,8 @@ def test_without_a_baseline_nothing_was_compared(call, quick_csv, bench_options)
     assert code == 0
     assert out.splitlines()[-1].startswith("unknown: no baseline yet; ")
     assert err == (
-        "valve_friction identify: --fail-on: there is no baseline, so no friction was compared: "
-        "give --baseline-recording or --baseline-coulomb-friction\n"
+        "valve_friction identify: --fail-on: no baseline, so friction was not compared: give "
+        "--baseline-recording or --baseline-coulomb-friction\n"
     )
 
 
@@ -398,7 +398,7 @@ def test_no_valve_file_for_a_pressure(refusal, quick_csv):
     [
         ("--fix mass=heavy", "--fix mass=heavy: 'heavy' is not a number"),
         ("--fix spring_constant", "--fix spring_constant: give a value, as spring_constant="),
-        ("--fix weight=1", "'weight' is not a parameter that can be fixed; choose from mass"),
+        ("--fix weight=1", "'weight' is not a parameter that can be fixed: choose from mass"),
         ("--fix coulomb_fricton=400", "'coulomb_fricton' is not a parameter that can be fixed; d"),
         ("--fix mass=1 --fix mass=2", "--fix mass is given twice"),
         ("--fix mass --fix mass", "--fix mass is given twice"),

@@ -41,7 +41,7 @@ WORDS = {
 SECTIONS = [
     "Parameters",
     "Uncertainty budget",
-    "Friction against its baseline",
+    "Friction compared with its baseline",
     "Record",
     "Valve signature",
     "Friction over speed",
@@ -196,8 +196,8 @@ def test_the_baseline_of_a_recording_with_its_signature(
     code, out, err = call(quick_csv, "--valve", bench_yaml, *BASELINE, "--baseline-recording", "a")
     assert (code, out) == (2, "")
     assert err == (
-        "valve_friction identify: --baseline-recording: its friction is the baseline: "
-        "give no other one\n"
+        "valve_friction identify: --baseline-recording provides the baseline: give no other "
+        "baseline\n"
     )
     rest = write_csv(columns_of(Recording(0.01, quick_record.pressure, 0 * quick_record.position)))
     code, out, err = call(rest, "--valve", bench_yaml, "--baseline-recording", rest)
@@ -233,7 +233,7 @@ def test_a_machine_without_a_spring_has_no_residual(reported, write_csv, quick_r
         (["--report", "no/r.html"], "no/r.html: there is no folder no: create it, or name another"),
         (
             ["--baseline-half-width", "2"],
-            "--baseline-half-width: give the baseline itself by --baseline-coulomb-friction",
+            "--baseline-half-width: give the baseline itself with --baseline-coulomb-friction",
         ),
         (
             ["--baseline-coulomb-friction", "0"],

@@ -385,11 +385,11 @@ class TestOneValve:
         found = answer(bag)
         assert found["parameters"]["coulomb_friction"]["value"] == pytest.approx(152.7, rel=0.01)
         assert found["warnings"][0] == (
-            "bag.mcap is cut off or damaged (File end magic is invalid): it was read as far as it "
-            "goes"
+            "bag.mcap is truncated or damaged (File end magic is invalid): it was read as far "
+            "as possible"
         )
         _, out, _ = call(bag)
-        assert "note: bag.mcap is cut off or damaged" in out
+        assert "note: bag.mcap is truncated or damaged" in out
 
     def test_a_refusal_tells_of_the_damage(self, call, tmp_path, quick_record):
         bag = write_bag(tmp_path / "bag", messages_of(quick_record), "sqlite3")
@@ -398,7 +398,7 @@ class TestOneValve:
         code, out, err = call(bag)
         assert (code, out) == (2, "")
         assert err.startswith(f"valve_friction identify: {bag}, /fv_101: the ")
-        assert "; bag.db3 is cut off or damaged (" in err
+        assert "; bag.db3 is truncated or damaged (" in err
         assert err.count("\n") == 1
 
     def test_without_ros(self, bag, bench_yaml):
@@ -455,7 +455,7 @@ class TestSeveralValves:
         assert (code, out) == (2, "")
         assert err == (
             "valve_friction identify: --plot draws one valve: choose one of /fv_101, /fv_102, "
-            "/fv_103 by --valve-name\n"
+            "/fv_103 with --valve-name\n"
         )
         picture = tmp_path / "one.png"
         assert call(fleet, "--valve-name", "fv_101", "--plot", picture)[0] == 0
@@ -463,7 +463,7 @@ class TestSeveralValves:
 
     def test_a_report_is_of_one(self, call, fleet, tmp_path):
         report = tmp_path / "one.html"
-        which = "one valve: choose one of /fv_101, /fv_102, /fv_103 by --valve-name\n"
+        which = "one valve: choose one of /fv_101, /fv_102, /fv_103 with --valve-name\n"
         for options, purpose in (
             (["--report", report], "--report is of"),
             (["--baseline-coulomb-friction", "150"], "--baseline-coulomb-friction is of"),
@@ -485,7 +485,7 @@ class TestNoRecording:
         code, out, err = call(bag)
         assert (code, out) == (2, "")
         assert err.startswith(f"valve_friction identify: {bag}")
-        assert "nothing of it can be read (bag.mcap: " in err
+        assert "it cannot be read (bag.mcap: " in err
         assert err.count("\n") == 1
 
     @pytest.mark.parametrize(

@@ -98,8 +98,8 @@ class TestChoice:
         assert end.value.code == 2
         assert capsys.readouterr() == (
             "",
-            f"valve_friction: there is no sub-command '{name}'; the nearest is '{nearest}'; "
-            "see --help\n",
+            f"valve_friction: unknown sub-command '{name}'; the nearest is '{nearest}'; see "
+            "--help\n",
         )
 
     @pytest.mark.parametrize("arguments", [[], ["--json", "identify"]])

@@ -89,7 +89,7 @@ def test_the_text_says_that_nothing_moves_and_how_to_play_it(plan, tmp_path):
     assert "put the loop in manual" in words
     assert "between 40 and 60 % of the travel" in words
     assert "1.5 to 1.8 times as wide" in words
-    assert "never that of the measured pressure" in words
+    assert "never the topic of the measured pressure" in words
     plays = [line for line in out.splitlines() if line.startswith("ros2 run")]
     on_valve, watched, on_bench = plays
     assert watched.startswith("ros2 run valve_friction_ros stroke_player --ros-args -r ")

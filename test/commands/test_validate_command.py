@@ -188,9 +188,12 @@ class TestRefusals:
         ("content", "cause"),
         [
             ("{", "not JSON"),
-            ("[" * 100_000, "not JSON of an estimate: it is nested too deeply"),
-            ("[]", "there are no parameters: give what `valve_friction identify --json` wrote"),
-            ('{"valves": {}}', "is of several valves: identify the one by --valve-name"),
+            ("[" * 100_000, "not JSON: it is nested too deeply"),
+            (
+                "[]",
+                "contains no parameters: give a file written by `valve_friction identify --json`",
+            ),
+            ('{"valves": {}}', "contains several valves: identify one of them with --valve-name"),
             ('{"parameters": {"mass": 1}}', "parameters.mass has no value"),
             ('{"parameters": {"mass": {"value": "1"}}}', "must be a number or null, got '1'"),
             ('{"parameters": {"weight": {"value": 1}}}', "unknown parameter 'weight'"),

@@ -284,12 +284,12 @@ class TestBaseline:
         assert one.sliding.value == pytest.approx(300.0, rel=0.02)
 
     def test_too_few(self):
-        with pytest.raises(RefusalError, match=r"no baseline yet: .* moves up and"):
+        with pytest.raises(RefusalError, match=r"cannot be the baseline yet: .* moves up and"):
             baseline_by_evidence(evidence(lambda _: 300.0, hours=0.2))
 
     def test_too_wide(self):
         wide = evidence(lambda _: 50.0, settings=IdentificationSettings(timing_uncertainty=0.1))
-        with pytest.raises(RefusalError, match=r"known to .* a baseline needs"):
+        with pytest.raises(RefusalError, match=r"known to .* a baseline requires"):
             baseline_by_evidence(wide)
 
     @pytest.mark.parametrize(("share", "serves"), [(0.13, True), (0.131, False)])

@@ -309,7 +309,7 @@ class TestRefusals:
 
     @pytest.mark.parametrize(
         ("start", "last", "what"),
-        [(StemState(0.01), 0.0, "starts or stops"), (StemState(0.0, 0.015), 1e6, "turns")],
+        [(StemState(0.01), 0.0, "starts or stops"), (StemState(0.0, 0.015), 1e6, "reverses")],
     )
     def test_a_stem_that_swings_for_ever(self, start, last, what):
         """A massless stem on a stiff spring swings 10^10 times within the sample of 10 s."""

@@ -141,7 +141,7 @@ def test_interrupted_while_it_waits(busy):
     assert ended(process) == (
         130,
         "",
-        "valve_friction call: interrupted: the identifier goes on with what it has begun\n",
+        "valve_friction call: interrupted: the identifier continues the task it has started\n",
     )
 
 

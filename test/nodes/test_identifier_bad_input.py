@@ -186,7 +186,7 @@ def test_stamps_that_go_back_clear_the_buffer(client, signal):
     topic = {"pressure": "actuator_pressure", "stem": "stem_state"}[signal]
     reason = client.identify_all(0).message
     assert "no samples" in reason
-    assert f"the buffer was cleared: stamps of {topic} returned by 5.99 s" in reason
+    assert f"the buffer was cleared: the time stamps of {topic} returned by 5.99 s" in reason
     identifies_the_next_record(client)
 
 

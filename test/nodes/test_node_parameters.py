@@ -130,7 +130,7 @@ def test_known_values_have_the_units_of_their_parameters(client):
     }
     descriptors = client.describe(NODE, [f"fixed.{name}" for name in units])
     for (name, unit), descriptor in zip(units.items(), descriptors, strict=True):
-        assert descriptor.description.startswith(f"Known value of {name} [{unit}],")
+        assert descriptor.description.startswith(f"Known value of {name} [{unit}];")
 
 
 @pytest.mark.parametrize(

@@ -237,8 +237,8 @@ class TestBadSamples:
         np.testing.assert_array_equal(valve.recording().position, record.position[1001:])
         (note,) = valve.notes
         assert note == (
-            "stamps of actuator_pressure returned by 2 s: what was recorded before that was left "
-            "out"
+            "the time stamps of actuator_pressure returned by 2 s: data recorded before that was "
+            "left out"
         )
 
     def test_undecodable(self, tmp_path):
@@ -343,8 +343,8 @@ class TestDamagedBags:
             assert_equal(found, record, len(found))
             assert len(found) > 0.4 * share * len(record)
             (note,) = valve.notes
-            assert note.startswith(f"{file.name} is cut off or damaged (")
-            assert note.endswith("): it was read as far as it goes")
+            assert note.startswith(f"{file.name} is truncated or damaged (")
+            assert note.endswith("): it was read as far as possible")
 
     def test_sqlite_without_the_way_to_its_rows(self, tmp_path):
         """So long a table that its inner pages, which lead to the rows, are behind the cut."""
@@ -407,7 +407,7 @@ class TestDamagedBags:
         assert_equal(found, record, len(found))
         (note,) = part.notes
         assert re.fullmatch(
-            r"bag\.mcap is cut off or damaged \(.*\): it was read as far as it goes", note
+            r"bag\.mcap is truncated or damaged \(.*\): it was read as far as possible", note
         )
 
     def test_a_write_ahead_log_is_read(self, bag_of, record):
@@ -432,8 +432,8 @@ class TestDamagedBags:
         valve = only(left)
         assert_equal(valve.recording(), record)
         assert valve.notes == (
-            "record.db3 is cut off or damaged (its recorder did not close it): it was read as "
-            "far as it goes",
+            "record.db3 is truncated or damaged (it was not closed by its recorder): it was read "
+            "as far as possible",
         )
 
     def test_zeros_at_the_end(self, bag_of, record):
@@ -456,14 +456,14 @@ class TestNoBags:
     def test_empty_file(self, tmp_path, name):
         path = tmp_path / name
         path.write_bytes(b"")
-        assert problem(path) == ": the file is empty: nothing was recorded, or copied"
+        assert problem(path) == ": the file is empty: nothing was recorded or copied"
 
     def test_nothing_of_it_is_left(self, bag_of):
         for kind in KINDS:
             file = storage_file(bag_of(*kind))
             file.write_bytes(file.read_bytes()[:60])
-            assert ": nothing of it can be " in problem(file)
-            assert problem(file).endswith("copy or record it anew")
+            assert ": it cannot be " in problem(file)
+            assert problem(file).endswith("copy or record it again")
 
     def test_missing(self, tmp_path):
         assert problem(tmp_path / "record.mcap") == ": no such file or folder"
@@ -476,12 +476,14 @@ class TestNoBags:
 
     def test_folder_without_a_bag(self, tmp_path):
         (tmp_path / "notes.txt").write_text("none")
-        assert problem(tmp_path).startswith(": no bag: the folder holds no .mcap or .db3 file")
+        assert problem(tmp_path).startswith(
+            ": not a bag: the folder contains no .mcap or .db3 file"
+        )
 
     def test_bag_without_topics(self, tmp_path):
         for storage in STORAGES:
             bag = write_bag(tmp_path / storage, [], storage)
-            assert problem(bag) == ": the bag is empty: its recorder heard no topic"
+            assert problem(bag) == ": the bag is empty: the recorder received no messages"
 
     def test_topics_without_messages(self, tmp_path):
         bag = write_bag(tmp_path / "bag", list(with_pressure())[:2])
@@ -498,12 +500,12 @@ class TestNoBags:
     def test_ros_1(self, tmp_path):
         path = tmp_path / "record.bag"
         path.write_bytes(b"#ROSBAG V2.0\n" + bytes(100))
-        assert problem(path) == ": a bag of ROS 1: convert it by rosbags-convert"
+        assert problem(path) == ": a ROS 1 bag: convert it with rosbags-convert"
 
     def test_something_else_under_that_name(self, tmp_path):
         path = tmp_path / "record.mcap"
         path.write_bytes(gzip.compress(b"time_s,position_m,pressure_pa\n"))
-        assert problem(path).startswith(": neither MCAP nor SQLite3, whatever its name says")
+        assert problem(path).startswith(": neither MCAP nor SQLite3, despite its name")
 
     @pytest.mark.parametrize("profile", ["", "ros1"])
     def test_mcap_of_something_else(self, bag_of, profile):
@@ -511,14 +513,14 @@ class TestNoBags:
         file = storage_file(bag_of())
         header = struct.pack("<BQI", 1, 8 + len(profile), len(profile)) + profile.encode()
         file.write_bytes(b"\x89MCAP0\r\n" + header + bytes(4))
-        assert problem(file).startswith(": nothing of it can be read (record.mcap: ")
+        assert problem(file).startswith(": it cannot be read (record.mcap: ")
 
     def test_another_database(self, tmp_path):
         file = tmp_path / "history.db3"
         with sqlite3.connect(file) as database:
             database.execute("CREATE TABLE topics (name TEXT)")
         database.close()
-        assert problem(file).startswith(": nothing of it can be read (history.db3: ")
+        assert problem(file).startswith(": it cannot be read (history.db3: ")
 
     def test_no_topics_of_the_wanted_types(self, tmp_path):
         message = ("/level", "std_msgs/msg/Float64", START, number_message(1.0))

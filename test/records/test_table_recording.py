@@ -547,11 +547,13 @@ class TestUnreadableFiles:
     def test_no_table_at_all(self, tmp_path):
         path = tmp_path / "record.csv"
         path.write_bytes(b"x" * 200_000)
-        assert refused(path).startswith(f"there is only one column, '{'x' * 40}…'")
+        assert refused(path).startswith(f"only one column, '{'x' * 40}…'")
         path.write_bytes(b"x" * 2_000_000)
         assert refused(path).startswith("cannot be read as CSV: a line has more than 1048576 bytes")
         path.write_bytes("\n".join([HEADER, *GOOD[:10], ""]).encode() + b'"' + b"x\n" * 1_000_000)
-        assert refused(path).startswith("cannot be read as CSV: a quote has no end within 1048576")
+        assert refused(path).startswith(
+            "cannot be read as CSV: a quote is not closed within 1048576"
+        )
 
     def packed(self, write):
         """Enough gzipped text that its header can be read without its end."""

@@ -184,7 +184,7 @@ def test_what_all_share_and_what_is_ones_own(write_parameters):
     assert (first.valve.travel, second.valve.travel) == (0.04, 0.03)
     assert (first.settings["fixed.mass"], second.settings["fixed.mass"]) == (1.7, 1.8)
     assert second.valve.diaphragm_area == 0.0445
-    with pytest.raises(ValueError, match=r"fv_101, fv_102\): choose one by --valve-name"):
+    with pytest.raises(ValueError, match=r"fv_101, fv_102\): choose one with --valve-name"):
         read_valve_file(path)
 
 

@@ -155,5 +155,5 @@ def test_an_installation_without_it_says_where_it_is(monkeypatch, tmp_path, caps
     )
     assert run(["reproduce-paper", "--output", str(tmp_path)]) == 2
     told = capsys.readouterr().err
-    assert told.startswith("valve_friction reproduce-paper: the reproduction is no part of the")
+    assert told.startswith("valve_friction reproduce-paper: the reproduction is not part of the")
     assert told.endswith("where it lies in examples/paper\n")

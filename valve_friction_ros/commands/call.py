@@ -48,12 +48,12 @@ def run(options: argparse.Namespace) -> int:
         bar.update(task, description=f"{identifier}: {options.service}")
         answer = client.call(identifier, options.service, options.timeout)
     if answer is None:
-        complain(options.command, "interrupted: the identifier goes on with what it has begun")
+        complain(options.command, "interrupted: the identifier continues the task it has started")
         return stop.exit_code
     if not answer.success:
         raise RefusalError(f"{identifier}: {answer.message}")
     print(f"{answer.level.name}: {answer.message}" if answer.level is not None else answer.message)
     sys.stdout.flush()
     if answer.level is None and options.fail_on:
-        raise RefusalError(f"{identifier}: its diagnosis did not come on /diagnostics")
+        raise RefusalError(f"{identifier}: its diagnosis did not appear on /diagnostics")
     return ExitCode.ALARM if has_failed(options, filter(None, [answer.level])) else ExitCode.DONE

@@ -38,7 +38,7 @@ def run(options: argparse.Namespace) -> int:
     """Serve the pages until Ctrl-C or SIGTERM."""
     place = options.file
     if isinstance(place, Path) and not place.is_file():
-        raise ValueError(f"{place}: there is no such file: `identify-folder --history` makes it")
+        raise ValueError(f"{place}: no such file: `identify-folder --history` creates it")
     access = Access(host=options.host, accounts=accounts_from(options.accounts))
     shown = DashboardOptions(
         access,

@@ -47,7 +47,7 @@ def _asked(question: ActuatorQuestion) -> Any:
         text = line.strip() or question.default
         if text is None and not line:
             option = question.name.replace("_", "-")
-            raise ValueError(f"{question.words} is missing: give it by --{option}")
+            raise ValueError(f"{question.words} is missing: give it with --{option}")
         try:
             if text:
                 return question.read(text)
@@ -80,10 +80,12 @@ def run(options: argparse.Namespace) -> int:
     """Ask, and write the file."""
     output: Path | None = options.output
     if output is not None and output.exists() and not options.replace:
-        raise ValueError(f"{output}: it exists: give another name, or --replace")
+        raise ValueError(f"{output}: it exists already: give another name, or --replace")
     answers = _answers(options)
     if answers["opposing_area"] is not None and answers["acting"] != "double":
-        raise ValueError("--opposing-area is of a double-acting actuator: give --acting double")
+        raise ValueError(
+            "--opposing-area belongs to a double-acting actuator: give --acting double"
+        )
     if answers["opposing_area"] == 0:
         answers["opposing_area"] = answers["area"]
     text = valve_description(answers, given_columns(options))

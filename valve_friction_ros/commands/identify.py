@@ -97,11 +97,11 @@ def baseline_from(options: argparse.Namespace) -> Baseline | None:
     """
     friction, width = options.baseline_coulomb_friction, options.baseline_half_width
     if options.baseline_recording is not None and (friction, width) != (None, None):
-        raise ValueError("--baseline-recording: its friction is the baseline: give no other one")
+        raise ValueError("--baseline-recording provides the baseline: give no other baseline")
     if friction is None:
         if width is not None:
             raise ValueError(
-                "--baseline-half-width: give the baseline itself by --baseline-coulomb-friction"
+                "--baseline-half-width: give the baseline itself with --baseline-coulomb-friction"
             )
         return None
     return Baseline(friction, 0.0 if width is None else width)
@@ -293,8 +293,8 @@ def run(options: argparse.Namespace) -> int:
     if options.fail_on is not None and baseline is None:
         complain(
             options.command,
-            "--fail-on: there is no baseline, so no friction was compared: give "
-            "--baseline-recording or --baseline-coulomb-friction",
+            "--fail-on: no baseline, so friction was not compared: give --baseline-recording or "
+            "--baseline-coulomb-friction",
         )
     levels = (level for each in results for level in each.levels)
     return ExitCode.ALARM if has_failed(options, levels) else code

@@ -320,7 +320,9 @@ REFUSALS = (HistoryError,)
 def _require_sense(options: argparse.Namespace) -> None:
     """Refuse at once what would be refused of every recording."""
     if options.jobs is not None and options.scheduler is not None:
-        raise ValueError("--jobs is of this machine: with --scheduler the cluster has its workers")
+        raise ValueError(
+            "--jobs applies to this machine only: with --scheduler the cluster uses its own workers"
+        )
     if options.jobs is not None and options.jobs < 1:
         raise ValueError(f"--jobs must be at least 1, got {options.jobs}")
     for output in options.output:
@@ -336,11 +338,11 @@ def _require_sense(options: argparse.Namespace) -> None:
     if options.valve is not None:
         read_valve_file(options.valve)
     if options.plant is not None and options.valve is not None:
-        raise ValueError("--plant: its table describes the valves: give no --valve")
+        raise ValueError("--plant: its table already describes the valves: omit --valve")
     if options.history is not None and options.plant is None:
-        raise ValueError("--history files by tag: give the table of the tags by --plant")
+        raise ValueError("--history stores results by tag: give the table of tags with --plant")
     if options.first_is_baseline and options.history is None:
-        raise ValueError("--first-is-baseline: the baseline is kept in a history: give --history")
+        raise ValueError("--first-is-baseline: the baseline is stored in a history: give --history")
 
 
 def _baselines(options: argparse.Namespace, names: Sequence[str]) -> Baselines:
@@ -371,9 +373,7 @@ def _planned(options: argparse.Namespace) -> dict[str, Plan]:
         rest = f" and {more} more" if more > 0 else ""
         print(f"skipped, no recordings: {shown}{rest}", file=sys.stderr)
     if not findings.recordings:
-        raise ValueError(
-            f"{options.folder}: there are no tables (CSV, xlsx, Parquet) and no bags in it"
-        )
+        raise ValueError(f"{options.folder}: contains no tables (CSV, xlsx, Parquet) and no bags")
     plant = {} if options.plant is None else read_plant(options.plant)
     joined = tuple(with_parts_joined(findings.recordings, plant))
     findings = replace(findings, recordings=joined)
@@ -463,8 +463,8 @@ def _run(options: argparse.Namespace, plans: Mapping[str, Plan], share_out: Shar
         if stop.wanted():
             complain(
                 options.command,
-                f"interrupted with {len(mine)} of {len(plans)} recordings in "
-                f"{options.output[0]}: the same command goes on from there",
+                f"interrupted with {len(mine)} of {len(plans)} recordings in {options.output[0]}: "
+                "run the same command to continue",
             )
             return stop.exit_code
     counted, rows = tally(mine), [row for entry in mine for row in entry.rows]

@@ -38,7 +38,7 @@ SUB_COMMANDS = {
     "inspect": "show what would be read of a table: columns, units, rates, gaps, quality",
     "identify-folder": "identify all recordings of a folder, on all cores",
     "describe-valve": "ask for an actuator's data and write its valve file",
-    "plan-test": "plan the stroke test that tells the friction best, as a file to play",
+    "plan-test": "plan the stroke test that determines friction best, as a file to play",
     "validate": "simulate a recording with an identified model",
     "call": "have a running identifier identify, set its baseline, save, report or clear",
     "history": "list, export and draw what the nodes have identified",
@@ -46,7 +46,7 @@ SUB_COMMANDS = {
     "dashboard": "serve plant, valves, alarms and comparison of a history, without ROS",
     "dashboard-account": "make an account of the dashboard, with the hash of a password",
     "reproduce-paper": "run the paper's programme and write a report",
-    "demo": "tighten the packing of a simulated valve that is monitored",
+    "demo": "tighten the packing of a monitored simulated valve",
 }
 """The line in ``--help`` by sub-command; ``identify-folder`` is the module `identify_folder`."""
 
@@ -81,7 +81,7 @@ def _chosen(arguments: Sequence[str]) -> tuple[str, list[str]]:
     chosen = parser.parse_args(arguments)
     if chosen.command not in SUB_COMMANDS:
         (nearest,) = difflib.get_close_matches(chosen.command, SUB_COMMANDS, 1, cutoff=0.0)
-        parser.error(f"there is no sub-command {chosen.command!r}; the nearest is {nearest!r}")
+        parser.error(f"unknown sub-command {chosen.command!r}; the nearest is {nearest!r}")
     two_words = " ".join((chosen.command, *chosen.arguments[:1]))
     if two_words in SUB_COMMANDS:
         return two_words, chosen.arguments[1:]

@@ -198,15 +198,15 @@ def print_plan(plan: StrokePlan, path: Path) -> None:
         "and --form a sheet for a person, with the limits at which to abort."
     )
     console.print(
-        "On a valve, the topic is that of your converter's command, never that of the measured "
-        "pressure: invented pressure would enter the identifier, and nothing would move. The "
-        "converter has a lag of its own, so the player has none:"
+        "On a real valve, use the command topic of your converter, never the topic of the "
+        "measured pressure: otherwise simulated pressure would enter the identifier and the valve "
+        "would not move. The converter has its own lag, so the player adds none:"
     )
     topic = "-r actuator_pressure:=/YOUR/CONVERTER/COMMAND"
     print(f"{_PLAY} {topic} {_parameters(player(plan, path))}")
     console.print(
-        "The same by a node that begins when its ~/start is called, watches stem and pressure, and "
-        "goes back at once:"
+        "The same with a node that starts when its ~/start is called, monitors stem and pressure, "
+        "and returns at once if a limit is exceeded:"
     )
     print(f"{_WATCHED} {_parameters(_watched(plan, path))}")
     console.print("On the simulated bench, with the bench's lag:")
@@ -279,7 +279,7 @@ def run(options: argparse.Namespace) -> int:
     files: list[Path] = [*filter(None, (options.output, options.table, options.form))]
     for path in files:
         if path.exists() and not options.replace:
-            raise ValueError(f"{path}: it exists: give another name, or --replace")
+            raise ValueError(f"{path}: it exists already: give another name, or --replace")
     require_outputs(*files, picture=options.figure)
     plan = _planned(options)
     signal = span(options.signal_range, PRESSURE) if options.signal_range else None

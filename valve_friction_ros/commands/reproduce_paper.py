@@ -27,7 +27,7 @@ def _examples() -> Path:
             if (folder / "paper" / "command.py").is_file():
                 return folder
     raise ValueError(
-        f"the reproduction is no part of the installed {package.name}: run this command in its "
+        f"the reproduction is not part of the installed {package.name}: run this command in its "
         "sources, where it lies in examples/paper"
     )
 

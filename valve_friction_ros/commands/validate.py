@@ -38,8 +38,8 @@ def _poor(validation: Validation, least: float) -> str:
         return ""
     return (
         f"poor: the model reproduces less than {100 * least:g} % of this movement: the valve has "
-        "changed, or the estimate is of another valve or of a poor record; identify this recording "
-        "too, and compare both results"
+        "changed, or the estimate comes from another valve or a poor record; identify this "
+        "recording too, and compare both results"
     )
 
 

@@ -62,17 +62,17 @@ class Columns:
     time_column: str = _described("", "header of the time", "HEADER")
     time_unit: str = _described("", f"{_units('time')}; dates are recognized", "UNIT")
     time_zone: str = _described(
-        "", "zone of local times that name none, as Europe/Berlin; without it: UTC", "ZONE"
+        "", "time zone of local times without one, such as Europe/Berlin; default: UTC", "ZONE"
     )
     time_format: str = _described(
-        "", "format of the dates, as '%%d.%%m.%%Y %%H:%%M:%%S.%%f' (strptime)", "FORM"
+        "", "format of the dates, such as '%%d.%%m.%%Y %%H:%%M:%%S.%%f' (strptime)", "FORM"
     )
     position_column: str = _described("", "header, or tag, of the stem position", "HEADER")
     position_unit: str = _described("", _units("position"), "UNIT")
     inverted_position: bool = _described(
         False,
-        "the position falls while the pressure pushes the stem, as the opening of an air-to-close "
-        "valve: take the travel (100 %%) less the position",
+        "the position decreases as the pressure pushes the stem, such as the opening of an "
+        "air-to-close valve: take the travel (100 %%) less the position",
     )
     pressure_column: str = _described("", "header, or tag, of the pressure", "HEADER")
     pressure_unit: str = _described("", _units("pressure"), "UNIT")
@@ -87,24 +87,26 @@ class Columns:
     )
     force_column: str = _described("", "header, or tag, of the force", "HEADER")
     force_unit: str = _described("", _units("force"), "UNIT")
-    tag_column: str = _described("", "header of the tags, where each row is one value", "HEADER")
-    value_column: str = _described("", "header of the values, where each row is one", "HEADER")
+    tag_column: str = _described("", "header of the tags, if each row holds one value", "HEADER")
+    value_column: str = _described(
+        "", "header of the values, if each row holds one value", "HEADER"
+    )
     good_quality: str = _described(
-        "", "what a column of qualities says of good values, with commas between them", "WORDS"
+        "", "entries of the quality column that mark good values, separated by commas", "WORDS"
     )
     maximum_bad_share: float = _described(
         0.05, "largest share of a signal's values that may be bad; those are left out", "SHARE"
     )
     delimiter: str = _described("", "between the entries of a row: , ; tab …", "MARK")
     decimal: str = _described("", "decimal mark, . or ,", "MARK")
-    encoding: str = _described("", "as utf-16 or cp1252", "NAME")
+    encoding: str = _described("", "such as utf-16 or cp1252", "NAME")
     skip_rows: int = _described(
-        0, "rows to skip at the top; those above the headers are found without it", "N"
+        0, "rows to skip at the top; rows above the headers are recognized without it", "N"
     )
-    comment: str = _described("", "leave out rows that begin with this mark, as #", "MARK")
-    sheet: str = _described("", "sheet of a workbook; without it: the first", "NAME")
-    maximum_rows: int = _described(10_000_000, "most rows to read", "N")
-    maximum_megabytes: float = _described(2000.0, "most of the file to read, unpacked", "MB")
+    comment: str = _described("", "leave out rows that begin with this mark, such as #", "MARK")
+    sheet: str = _described("", "sheet of a workbook; default: the first", "NAME")
+    maximum_rows: int = _described(10_000_000, "largest number of rows to read", "N")
+    maximum_megabytes: float = _described(2000.0, "largest size of the file, unpacked", "MB")
 
     def __post_init__(self) -> None:
         """Refuse impossible values."""

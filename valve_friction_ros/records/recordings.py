@@ -265,12 +265,12 @@ def _is_bag(path: Path, options: ReadingOptions) -> bool:
     if not is_bag(place):
         return False
     if options.beside:
-        raise ValueError(f"{path}: a bag holds all signals of its valves: name it alone")
+        raise ValueError(f"{path}: a bag holds all signals of its valves: give it alone")
     if place != path:
         raise ValueError(f"{path}: a bag cannot come through a pipe: name its folder or file")
     if options.columns.opposing_pressure_column:
         raise ValueError(
-            f"{path}: the actuator is double-acting (opposing_pressure_column), and a bag has one "
+            f"{path}: the actuator is double-acting (opposing_pressure_column), but a bag has one "
             "pressure per valve: record the difference of the two, or export both as CSV"
         )
     return True

@@ -131,8 +131,8 @@ class OpenTable:
         if layout.raw.is_text and not layout.times and len(layout.headers) < 2:
             (only, *_) = (*layout.headers, "")
             raise ValueError(
-                f"{self.path}: there is only one column, {quoted(only)}: name the delimiter of the "
-                "file (--delimiter)"
+                f"{self.path}: only one column, {quoted(only)}: name the delimiter of the file "
+                "(--delimiter)"
             )
         raise ValueError(f"{self.path}: cannot tell {'; '.join(layout.questions)}")
 
@@ -171,7 +171,7 @@ class OpenTable:
             most = max(sum(each.stamps.size for each in part.blocks) for part in parts)
             self._require_room(most)
         if start is None and not any(part.bad for part in parts):
-            raise ValueError(f"{self.path}: there are no rows under the header")
+            raise ValueError(f"{self.path}: no rows below the header")
         found = [part.joined(stretch.last) for part in parts]
         if not any(each.stamps.size for each in found) and not any(each.bad for each in found):
             raise RefusalError(
@@ -506,7 +506,7 @@ def read_columns(path: Path, names: Sequence[str]) -> dict[str, NDArray[np.float
     except (OSError, UnicodeError, ValueError, csv.Error) as error:
         raise ValueError(f"{path}: cannot be read: {cause_of(error)}") from None
     if not read:
-        raise ValueError(f"{path}: there are no rows under the header")
+        raise ValueError(f"{path}: no rows below the header")
     return dict(zip(names, np.array(read).T, strict=True))
 
 

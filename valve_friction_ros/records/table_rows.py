@@ -162,7 +162,7 @@ class _Bounded(io.RawIOBase):
         elif is_open:
             self._quoted += len(piece)
         if self._quoted > _LONGEST_LINE:
-            raise ValueError(f"a quote has no end within {_LONGEST_LINE} bytes")
+            raise ValueError(f"a quote is not closed within {_LONGEST_LINE} bytes")
 
 
 def encoding_of(start: bytes) -> str:
@@ -309,7 +309,7 @@ def _explained(path: Path, is_text: bool) -> Iterator[None]:
             raise
         cause = " ".join(cause_of(error).split())[:200] or type(error).__name__
         if cause.endswith("and found 0"):  # pandas' words for a block of blank lines
-            cause = f"{BLOCK} blank rows follow each other: cut them off"
+            cause = f"{BLOCK} blank rows in succession: remove them"
         if isinstance(error, UnicodeError):
             cause = f"{error}: name its encoding (--encoding)"
         kind = "CSV" if is_text else "a table"

@@ -179,5 +179,5 @@ def span(text: str, units: Mapping[str, Unit]) -> tuple[float, float]:
     unit = _unit(text, name, units)
     begin, end = _si(low, unit), _si(high, unit)
     if not begin < end:
-        raise ValueError(f"{text[:60]!r}: the range must rise")
+        raise ValueError(f"{text[:60]!r}: give the range from low to high")
     return begin, end

@@ -168,7 +168,7 @@ def _of_node(content: Mapping[Any, Any], valve: str | None) -> Mapping[Any, Any]
         chosen = own.get(valve.strip("/"), {})
     elif len(own) > 1:
         raise ValueError(
-            f"parameters of several valves ({', '.join(sorted(own))[:200]}): choose one by "
+            f"parameters of several valves ({', '.join(sorted(own))[:200]}): choose one with "
             "--valve-name"
         )
     else:

@@ -60,13 +60,14 @@ from valve_friction_ros.usage import LimitState, Usage, ValveUsage
 from valve_friction_ros.wording import member_words, percentage
 
 _VERDICTS = (
-    "Identified: half the interval is at most 5 % of the value, and no doubt is known. Weak: the "
-    "interval is wider, or the reason stands beside the verdict. Not identifiable: the record does "
-    "not determine the parameter, and no value is shown. Fixed: the value was given."
+    "Identified: half the interval is at most 5 % of the value, and nothing casts doubt on it. "
+    "Weak: the interval is wider, or there is a doubt, which is given beside the verdict. Not "
+    "identifiable: the record does not determine the parameter, and no value is shown. Fixed: the "
+    "value was given."
 )
-_FRICTION = "Friction against its baseline"
-_WHOLE_VALVE = "The valve beside its friction"
-_NOTHING_ELSE = "Nothing else has surely changed beyond its limit"
+_FRICTION = "Friction compared with its baseline"
+_WHOLE_VALVE = "Other changes of the valve"
+_NOTHING_ELSE = "Nothing else has changed significantly"
 _BUDGET = (
     "Sources of the interval widths. From record: noise, motion that the model does not explain, "
     "and imperfections of the valve. From timing: lag between the signals. From calibration: "
@@ -171,7 +172,7 @@ def _trend(history: ValveHistory) -> Section:
     picture = Picture(
         report_trend_figure(history, now),
         "Friction with its 95 % intervals, baseline and limits. Hollow: weak.",
-        "Friction of the valve over the time, with baseline and limits.",
+        "Friction of the valve over time, with baseline and limits.",
         report_trend_figure(history, now, is_narrow=True),
     )
     return Section("Trend", (Paragraph(told), picture))
@@ -181,7 +182,7 @@ def _record(record: IdentifiedRecord) -> Section:
     drive = record.recording.driven_by.words
     picture = Picture(
         record_figure(record.recording),
-        f"The record: {drive} and stem position over the time.",
+        f"The record: {drive} and stem position over time.",
         f"Two curves over {record.recording.duration:.3g} s: {drive} above, stem position below.",
     )
     return Section("Record", (picture, record_table(record)))
@@ -210,7 +211,7 @@ def _comparison(record: IdentifiedRecord, comparison: StemComparison) -> Section
         f"The measured stem and, dotted, the stem of the identified model under the same "
         f"{record.recording.driven_by.words}. Fit {100 * result.fit:.2f} %, rms "
         f"{result.rms * 1e6:.3g} µm{of_travel}.",
-        "Measured and simulated stem position over the time, in one panel.",
+        "Measured and simulated stem position over time, in one panel.",
     )
     return Section("Measured and simulated position", (picture,))
 
@@ -219,8 +220,8 @@ def _residual(record: IdentifiedRecord, comparison: StemComparison) -> Section:
     misfit = record.result.misfit
     picture = Picture(
         residual_figure(comparison),
-        f"The residual, simulated minus measured position, over the time.{_noise_words(misfit)}",
-        "Residual over the time.",
+        f"The residual, simulated minus measured position, over time.{_noise_words(misfit)}",
+        "Residual over time.",
     )
     histogram, correlation = noise_figures(comparison)
     return Section(
@@ -257,8 +258,8 @@ _MEANING = (
 
 _UNITS = {"travel_limit": "m", "reversal_limit": "reversals"}
 _NO_LIMIT = (
-    "The life of the packing has no limit: set the parameter travel_limit or reversal_limit to be "
-    "warned a month ahead."
+    "The packing life has no limit: set the parameter travel_limit or reversal_limit to be warned "
+    "a month ahead."
 )
 
 

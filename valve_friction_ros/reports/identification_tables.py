@@ -347,5 +347,8 @@ def _how_else(result: Result) -> str:
             )
         return f"The value fits the simulated stem to the measured one, {samples}. "
     if result.method in ("plant", "bench"):
-        return "The value averages force and friction as the acceleration, over all samples. "
+        return (
+            "The value averages force and friction in the same way as acceleration, over all "
+            "samples. "
+        )
     return ""

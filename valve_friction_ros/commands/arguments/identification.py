@@ -130,8 +130,8 @@ def add_fail_on(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--fail-on",
         choices=("warn", "error"),
-        help="exit code 3 if a diagnosis is as severe as this, or more; without a baseline no "
-        "friction is compared, which raises no alarm",
+        help="exit code 3 if a diagnosis is as severe as this, or more severe; without a baseline "
+        "no friction is compared and no alarm is raised",
     )
 
 
@@ -175,7 +175,7 @@ def chosen_valves(
     for name in names:
         if not any(_is_called(valve, name) for valve in valves):
             known = ", ".join(valve.name for valve in valves) or "none"
-            raise ValueError(f"{option} {name}: there is no such valve; there are {known}")
+            raise ValueError(f"{option} {name}: unknown valve; known valves: {known}")
     return tuple(valve for valve in valves if any(_is_called(valve, name) for name in names))
 
 
@@ -208,22 +208,23 @@ def read_estimate(path: Path) -> dict[str, float]:
         with path.open("rb") as stream:
             text = stream.read(_LARGEST + 1)
         if len(text) > _LARGEST:
-            raise ValueError(f"more than {_LARGEST // 1_000_000} MB: no estimate is so long")
+            raise ValueError(f"more than {_LARGEST // 1_000_000} MB: too large for an estimate")
         content = json.loads(text.decode("utf-8-sig"))
     except (OSError, UnicodeDecodeError) as error:
         raise ValueError(f"{path}: cannot be read: {cause_of(error)}") from None
     except json.JSONDecodeError as error:
         raise ValueError(f"{path}: not JSON: {error}") from None
     except RecursionError:
-        raise ValueError(f"{path}: not JSON of an estimate: it is nested too deeply") from None
+        raise ValueError(f"{path}: not JSON: it is nested too deeply") from None
     except ValueError as error:  # too large, as a whole or a number of thousands of digits
         raise ValueError(f"{path}: {error}") from None
     if isinstance(content, dict) and "valves" in content:
-        raise ValueError(f"{path}: is of several valves: identify the one by --valve-name")
+        raise ValueError(f"{path}: contains several valves: identify one of them with --valve-name")
     parameters = content.get("parameters") if isinstance(content, dict) else None
     if not isinstance(parameters, dict):
         raise ValueError(
-            f"{path}: there are no parameters: give what `valve_friction identify --json` wrote"
+            f"{path}: contains no parameters: give a file written by `valve_friction identify "
+            "--json`"
         )
     for name in parameters:
         if name not in PARAMETER_UNITS:

@@ -147,7 +147,7 @@ def _earlier(options: argparse.Namespace) -> Mapping[str, float]:
     valves = chosen_valves(file.valves(), names, "--valve-name")
     if len(valves) != 1:
         told = ", ".join(valve.name for valve in valves) or "none"
-        raise ValueError(f"{options.history}: holds {told}: choose one valve by --valve-name")
+        raise ValueError(f"{options.history}: holds {told}: choose one valve with --valve-name")
     entry = file.last_success(valves[0].name)
     if entry is None:
         raise ValueError(f"{options.history}: no identification of {valves[0].name} succeeded")
@@ -172,12 +172,14 @@ def frictions_from(options: argparse.Namespace, described: "ValveFile") -> "Fric
         if name not in found:
             option = name.replace("_", "-")
             raise ValueError(
-                f"the {name} is unknown, and pressures cannot be planned without it: give "
-                f"--estimate, --history or --{option}, or name it in the valve file, as "
+                f"the {name} is unknown, but pressures cannot be planned without it: give "
+                f"--estimate, --history or --{option}, or state it in the valve file, as "
                 "`describe-valve --spring-range` does"
             )
     if not found["spring_constant"] > 0:
-        raise ValueError("a machine without a spring has no stroke test: pressure holds no place")
+        raise ValueError(
+            "a machine without a spring has no stroke test: pressure alone does not hold a position"
+        )
     spring = found["spring_constant"], found["spring_preload"]
     mass = found.get("mass", IdentificationSettings().assumed_mass)
     if "coulomb_friction" not in found:

@@ -227,7 +227,7 @@ def require_one(recorded: "Sequence[RecordedValve]", purpose: str) -> None:
     """
     if len(recorded) > 1:
         names = ", ".join(each.name for each in recorded)
-        raise ValueError(f"{purpose} one valve: choose one of {names} by --valve-name")
+        raise ValueError(f"{purpose} one valve: choose one of {names} with --valve-name")
 
 
 def read_one(path: Path, valve: "Valve", reading: "ReadingOptions") -> "RecordedValve":

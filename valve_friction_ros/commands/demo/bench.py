@@ -195,7 +195,7 @@ def free_domain() -> Iterator[int]:
             if str(number) != set_already and _is_bound(claim, number):
                 yield number
                 return
-    raise BenchError("no ROS domain is free: end another demo")
+    raise BenchError("no free ROS domain: stop another demo")
 
 
 def _is_bound(claim: socket.socket, number: int) -> bool:

@@ -119,7 +119,7 @@ class ValveSignals:
         self._loop = _chart(loop_chart(record), "vf-chart-loop", "Signature: stem over pressure")
         self._drawn, self._looped = (-1, 0), self._shown - _SIGNATURE_EVERY
         if record is None:
-            text("p", "No record of the baseline is kept.", "vf-none")
+            text("p", "No recording of the baseline is stored.", "vf-none")
 
     def show(self) -> None:
         """Show what has come since the last time."""
@@ -150,7 +150,7 @@ def draw_trend(
         text("p", problem, "vf-none")
     if kept is None:
         if not problem:
-            text("p", "The history has no identification of this valve.", "vf-none")
+            text("p", "The history contains no identification of this valve.", "vf-none")
         return
     with element("div", "vf-filters", role="group", aria_label="Time that is shown"):
         for name, span in {**RANGES, "all": None}.items():
@@ -216,7 +216,7 @@ def draw_identifications(
 ) -> None:
     """Draw the identifications, the newest first, each with a link to compare it."""
     if history is None:
-        text("p", "The history has no identification of this valve.", "vf-none")
+        text("p", "The history contains no identification of this valve.", "vf-none")
         return
     with element("table", "vf-list"):
         table_head(("time", ""), ("level", ""), ("friction, N", "vf-n"), ("ratio", "vf-n"),

@@ -268,7 +268,7 @@ class ValveActions:
         def draw() -> None:
             for title, some in (
                 ("What is missing", [one.words for one in view.lacks]),
-                ("What may be done", lack_remedies(asked)),
+                ("What you can do", lack_remedies(asked)),
             ):
                 text("h2", title)
                 with element("ul", "vf-points"):
@@ -293,7 +293,7 @@ class ValveActions:
 
     async def _asked(self, service: str, question: Question, is_again: bool) -> bool:
         verb, note, yes = (
-            ("Set", "It is what all later diagnoses compare with: the valve must be healthy.",
+            ("Set", "All later diagnoses compare with it, so the valve must be healthy.",
              "Set anyway" if question.alarm else "Set baseline")
             if service == "set_baseline"
             else ("Restore", "This undoes the last change of the baseline.", "Restore baseline")
@@ -309,8 +309,8 @@ class ValveActions:
             ui.label(note).classes("vf-none")
             if question.alarm:
                 ui.label(
-                    f"The valve is in {question.alarm}: make sure that it is healthy. "
-                    "Another baseline may hide what is wrong."
+                    f"The valve is in {question.alarm}: make sure that it is healthy. A new "
+                    "baseline could hide the fault."
                 ).classes("vf-answer vf-answer-error")
 
         title = f"{verb} the baseline of {question.tag}?"
@@ -350,7 +350,7 @@ _SLOWER = 5
 _LISTS = (
     ("changes", "Changes since the baseline", "Nothing has been compared with a baseline yet."),
     ("evidence", "Moves in service", "No moves have been evaluated yet."),
-    ("usage", "Usage of the packing", "No usage has been counted yet."),
+    ("usage", "Usage of the packing", "No usage recorded yet."),
     ("fit", "Fit of the model", "No estimate yet."),
     ("command", "Answer to the command", "No stem_command has been received."),
     ("counters", "Node and samples", "Nothing has been received yet."),
@@ -508,7 +508,7 @@ class _ValvePage:
         sharing = ValveFiles.sharing(self._view().namespace, (one.view.namespace for one in valves))
         if files and sharing:
             names = printable(", ".join(sharing), 300)
-            text("p", f"Files of {names} have the same names: they are listed, too.", "vf-none")
+            text("p", f"Files of {names} have the same names and are listed too.", "vf-none")
         draw_files(files, self._page.zone)
 
     def _compare(self, stamp: int) -> str:

@@ -77,7 +77,7 @@ class SqliteFile:
         self._folder: TemporaryDirectory[str] | None = None
         is_logged = file.with_name(f"{file.name}-wal").exists()
         if is_logged and not salvage:
-            raise DamagedFileError(path, "its recorder did not close it")
+            raise DamagedFileError(path, "it was not closed by its recorder")
         if surplus and not is_logged and salvage:
             # SQLite would fill up the last page with zeros, and believe them.
             self._folder = TemporaryDirectory()
@@ -250,8 +250,8 @@ def storage_files(path: Path) -> tuple[list[Path], list[str]]:
             notes.append(f"{', '.join(surplus)} is not in metadata.yaml, and was left out")
     if not files:
         raise ValueError(
-            f"{path}: no bag: the folder holds no .mcap or .db3 file: name the folder that the "
-            "recorder made"
+            f"{path}: not a bag: the folder contains no .mcap or .db3 file: give the folder "
+            "created by the recorder"
         )
     return files, notes
 
@@ -278,12 +278,12 @@ def _is_mcap(path: Path, start: bytes) -> bool:
     if start.startswith((MCAP, SQLITE)):
         return start.startswith(MCAP)
     if not start and path.stat().st_size:
-        raise ValueError(f"{path}: nothing of it can be unpacked: copy or record it anew")
+        raise ValueError(f"{path}: it cannot be unpacked: copy or record it again")
     if not start:
-        raise ValueError(f"{path}: the file is empty: nothing was recorded, or copied")
+        raise ValueError(f"{path}: the file is empty: nothing was recorded or copied")
     if start.startswith(ROS_1):
-        raise ValueError(f"{path}: a bag of ROS 1: convert it by rosbags-convert")
-    raise ValueError(f"{path}: neither MCAP nor SQLite3, whatever its name says: record it anew")
+        raise ValueError(f"{path}: a ROS 1 bag: convert it with rosbags-convert")
+    raise ValueError(f"{path}: neither MCAP nor SQLite3, despite its name: record it again")
 
 
 @contextlib.contextmanager
@@ -377,7 +377,7 @@ class ValveFeed:
         ]
         cause = self._buffer.snapshot().cleared_because
         if cause is not None:
-            notes.append(f"{cause}: what was recorded before that was left out")
+            notes.append(f"{cause}: data recorded before that was left out")
         return notes
 
     def recording(self) -> Recording:
@@ -410,9 +410,9 @@ def _valves(
     if not topics:
         cause = "; ".join(f"{file.name}: {cause}" for file, cause in damaged.items())
         raise ValueError(
-            f"{path}: nothing of it can be read ({cause}): copy or record it anew"
+            f"{path}: it cannot be read ({cause}): copy or record it again"
             if damaged
-            else f"{path}: the bag is empty: its recorder heard no topic"
+            else f"{path}: the bag is empty: the recorder received no messages"
         )
     try:
         return valves_in(topics, choice)
@@ -479,7 +479,7 @@ def read_bag(
         except OSError as error:
             raise ValueError(f"{path}: cannot be read: {error.strerror or error}") from None
     notes += [
-        f"{file.name} is cut off or damaged ({cause}): it was read as far as it goes"
+        f"{file.name} is truncated or damaged ({cause}): it was read as far as possible"
         for file, cause in damaged.items()
     ]
     return tuple(
