@@ -280,7 +280,7 @@ def test_interrupted(fleet, output, arguments, number, code):
     assert (found, out) == (code, "")
     assert "Traceback" not in err
     assert "interrupted with 3 of 6 recordings" in err
-    assert "the same command goes on" in err
+    assert "run the same command to continue" in err
     assert len(done(output)) == 3
     assert set(done(output)) < set(fleet)
 
