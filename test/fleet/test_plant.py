@@ -398,7 +398,7 @@ class TestDashboard:
 
     def test_what_is_no_history_is_refused(self, tmp_path, capsys):
         assert run(["dashboard", str(tmp_path / "none.sqlite")]) == 2
-        assert "there is no such file" in capsys.readouterr().err
+        assert "no such file" in capsys.readouterr().err
 
 
 WITHOUT_ROS = """
