@@ -10,6 +10,7 @@
 """Shared by all tests: the bench valves and their simulated records."""
 
 import contextlib
+import os
 import signal
 import subprocess
 import sys
@@ -21,6 +22,7 @@ import numpy as np
 import pytest
 from hypothesis import settings
 from postgres import database, postgres  # noqa: F401 - fixtures
+from processes import MARK, orphans
 from records import sine_record
 
 from valve_friction_ros.model import (
@@ -42,6 +44,8 @@ SAMPLE_PERIOD = 1e-3
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
+os.environ[MARK] = str(os.getpid())
+
 # The same examples in every run, and no deadline: the first call of a kernel compiles it.
 settings.register_profile("project", deadline=None, derandomize=True)
 settings.load_profile("project")
@@ -59,15 +63,15 @@ def pytest_configure(config):
 
 
 def pytest_collection_modifyitems(items):
-    """Let each test over the middleware run twice before it counts as failed.
+    """Let each test over the middleware run three times before it counts as failed.
 
     Fast DDS 2.14.5 at times locks itself up when participants come and go (its issue 6502), and
     loses an answer that comes before discovery has ended (rmw_fastrtps issue 842). The summary
-    names each test that ran twice.
+    names each test that ran again.
     """
     for item in items:
         if "ros_environment" in item.fixturenames:
-            item.add_marker(pytest.mark.flaky(reruns=1))
+            item.add_marker(pytest.mark.flaky(reruns=2))
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -80,6 +84,16 @@ def pytest_runtest_setup(item):
     if shared and getattr(item, "execution_count", 1) > 1:
         with contextlib.suppress(AssertionError):
             shared[-1].finish(item._request)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_teardown(item):
+    """End the nodes that a test over the middleware has left running: they would slow the next."""
+    yield
+    if "ros_environment" in item.fixturenames:
+        for orphan in orphans():
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(orphan, signal.SIGKILL)
 
 
 class Bench(NamedTuple):

@@ -105,7 +105,7 @@ def stamped(stamp: int, pressure: float, position: float) -> tuple[FluidPressure
 class Nonsense(Enum):
     """What is wrong, with words that the node must find for it."""
 
-    WRONG_JOINT = "no position of the joint 'stem'"
+    WRONG_JOINT = "no position for the joint 'stem'"
     PRESSURE_NAN = "actuator_pressure: 100 % of its samples are rejected"
     POSITION_NAN = "stem_state: 100 % of its samples are rejected"
     PRESSURE_ABOVE = "9e+05 Pa is outside the sensor's range"

@@ -19,22 +19,13 @@ from pathlib import Path
 
 import pytest
 from browser import Tab, chromium
+from processes import processes_with
 
 pytest.importorskip("nicegui", reason="NiceGUI is not installed")
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
 HERE = Path(__file__).parent
 PATIENCE = 180.0
-
-
-def processes_of(session_home):
-    """The processes that run in a demo's folder, by their environment."""
-    found = []
-    for place in Path("/proc").glob("[0-9]*"):
-        with contextlib.suppress(OSError):
-            if str(session_home).encode() in (place / "environ").read_bytes():
-                found.append(int(place.name))
-    return found
 
 
 IN_THE_BACKGROUND = ["sh", "-c", 'trap "" INT; exec "$@"', "sh"]
@@ -80,11 +71,11 @@ def demo(request, ros_environment, tmp_path):
 
 
 def ends_clean(demo, request):
-    nodes = processes_of(demo.folder)
+    nodes = processes_with(str(demo.folder))
     assert len(nodes) > 10  # itself, the dashboard, and three nodes a valve
     demo.send_signal(request)
     assert demo.wait(60) == 0
-    assert processes_of(demo.folder) == []
+    assert not processes_with(str(demo.folder))
     assert list(demo.folder.iterdir()) == []
     assert "Traceback" not in demo.log.read_text()
 

@@ -268,7 +268,7 @@ def test_nobody_on_the_graph_fills_the_disk_by_saving(live, tmp_path):
     assert len(list(folder.iterdir())) == sum(one.success for one in answers)
     page = live.client.trigger("report")  # some 200 kB
     assert not page.success
-    assert page.message.startswith("no room: fv_101 takes ")
+    assert page.message.startswith("no space left: fv_101 uses ")
     assert list((tmp_path / "pages").iterdir()) == []
 
 
