@@ -571,6 +571,13 @@ def runs_of(active: NDArray[np.bool_]) -> list[list[int]]:
     return edges
 
 
+def all_around(which: NDArray[np.bool_], reach: int) -> NDArray[np.bool_]:
+    """Return where all samples up to `reach` before and after are set."""
+    sums = np.concatenate([[0], np.cumsum(np.pad(which, reach, mode="edge"))])
+    width = 2 * reach + 1
+    return np.asarray(sums[width:] - sums[:-width] == width)
+
+
 _FEWEST_CHANGES = 20
 _SHORTER_HOLD = 0.6
 _FEW_SHORTER = 0.02

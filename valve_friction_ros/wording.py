@@ -563,10 +563,12 @@ _TABLES: dict[str, Mapping[str, str]] = {
 }
 """Words for the members of enums and for names, by table."""
 
-_MORE_STROKES = (
+MORE_STROKES = (
     "record more strokes, some fast and some slow, and set timing_uncertainty if the clocks and "
     "lags of both signals are known"
 )
+"""How to know a friction better."""
+
 _SLIDING_SIZE = "{value,half_width:±} N at {speed:in .3g mm/s} mm/s"
 _HEALTHY = "call ~/set_baseline while it is healthy"
 _SET_BASELINE = "call ~/set_baseline while the valve is healthy"
@@ -624,7 +626,7 @@ _SENTENCES = {
     Code.BASELINE_SLIDING: f"sliding friction {_SLIDING_SIZE}",
     Code.SLIDING_SIZE: _SLIDING_SIZE,
     Code.BASELINE_REMARK: "it is known to ±{share:percent}: only growth to {least:.2g} times or "
-    "more is certain to be reported; " + _MORE_STROKES,
+    "more is certain to be reported; " + MORE_STROKES,
     Code.BY_MOVES: "from {moves} moves in service since {since:minute}{dead_band}",
     Code.CHANGED: "{of}; the change occurred between {earliest:minute} and {latest:minute}",
     Code.AREA_AND_SCALE: "the scale of the {drive:drive} sensor and the diaphragm area",

@@ -115,7 +115,7 @@ class Nonsense(Enum):
     STEM_LATE = "later than actuator_pressure"
     CLOCK_AHEAD = "3e+08 s ahead of the clock"
     CLOCK_BEHIND = "3e+08 s behind the clock"
-    NO_STAMPS = "they repeat a stamp"
+    NO_STAMPS = "time stamps are repeated"
 
 
 def said(kind: Nonsense | None, now: int) -> tuple[FluidPressure, JointState]:

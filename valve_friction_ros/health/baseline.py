@@ -18,7 +18,7 @@ from valve_friction_ros.health.measured import Measured
 from valve_friction_ros.health.valve_numbers import valve_numbers
 from valve_friction_ros.identification import SLIDING, Parameter, RefusalError, Result
 from valve_friction_ros.model.checks import require_non_negative, require_positive
-from valve_friction_ros.wording import Code, Statement, lack_words, said, sentence
+from valve_friction_ros.wording import MORE_STROKES, Code, Statement, lack_words, said, sentence
 
 GOOD_SHARE, LARGEST_SHARE = 0.13, 0.33
 """Half widths of a friction, as shares of its value, of a good baseline and of the widest.
@@ -27,11 +27,6 @@ With the one a friction that has grown by half, and is known no better, is still
 grown, with the other one that has doubled: ln(1.5/1.25)/√2 and ln(2/1.25)/√2, with the 1.25 of
 `FrictionLimits`."""
 
-
-_MORE = (
-    "record more strokes, some fast and some slow, and set timing_uncertainty if the clocks and "
-    "lags of both signals are known"
-)
 _OTHER_METHOD = "use a method that gives confidence intervals"
 
 
@@ -235,7 +230,7 @@ class Baseline:
             why_not = "; ".join(_why_not(frictions[name], one) for name, one in lacks.items())
             without = all(math.isnan(one.half_width) for one in frictions.values())
             has_value = any(not math.isnan(one.value) for one in frictions.values())
-            remedy = _OTHER_METHOD if without and has_value else _MORE
+            remedy = _OTHER_METHOD if without and has_value else MORE_STROKES
             raise BaselineRefusalError(
                 f"this result cannot be the baseline: {why_not}: {remedy}", *lacks.values()
             )

@@ -73,7 +73,7 @@ class KnownNumbers:
                 continue
             if stop in dated and _is_beyond(fresh[end], dated[stop].number, side):
                 del dated[stop]
-            if end in dated and not side * (fresh[end].value - dated[end].value) >= 0:
+            if end in dated and not _is_farther(fresh[end], dated[end].number, side):
                 del fresh[end]
         dated |= {n: DatedNumber(time, one.value, one.half_width) for n, one in fresh.items()}
         return KnownNumbers(dated, time)
@@ -114,6 +114,10 @@ class KnownNumbers:
             return finding
         dated = said(Code.MEASURED_EARLIER, of=finding.statement, time=min(times))
         return replace(finding, statement=dated)
+
+
+def _is_farther(end: Measured, before: Measured, side: float) -> bool:
+    return side * (end.value - before.value) >= 0
 
 
 def _is_beyond(end: Measured, stop: Measured, side: float) -> bool:

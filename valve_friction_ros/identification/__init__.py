@@ -34,12 +34,6 @@ if TYPE_CHECKING:
         identify as identify,
         method_named as method_named,
     )
-    from valve_friction_ros.identification.steps.validation import (
-        IdentifiedModel as IdentifiedModel,
-        Validation as Validation,
-        identified_model as identified_model,
-        validate as validate,
-    )
     from valve_friction_ros.identification.published.estimate import (
         Estimate as Estimate,
     )
@@ -95,6 +89,12 @@ if TYPE_CHECKING:
         StepTest as StepTest,
         find_steps as find_steps,
         step_test as step_test,
+    )
+    from valve_friction_ros.identification.steps.validation import (
+        IdentifiedModel as IdentifiedModel,
+        Validation as Validation,
+        identified_model as identified_model,
+        validate as validate,
     )
     from valve_friction_ros.identification.trust.misfit import (
         LEAST_FIT as LEAST_FIT,

@@ -34,10 +34,6 @@ if TYPE_CHECKING:
         SensorNoise as SensorNoise,
         converter_response as converter_response,
     )
-    from valve_friction_ros.model.valve import (
-        KarnoppParameters as KarnoppParameters,
-        Valve as Valve,
-    )
     from valve_friction_ros.model.simulation import (
         StemState as StemState,
         Trajectory as Trajectory,
@@ -45,6 +41,10 @@ if TYPE_CHECKING:
         balanced_state as balanced_state,
         compile_kernels as compile_kernels,
         simulate as simulate,
+    )
+    from valve_friction_ros.model.valve import (
+        KarnoppParameters as KarnoppParameters,
+        Valve as Valve,
     )
 else:
     __getattr__ = names_on_demand(__name__)

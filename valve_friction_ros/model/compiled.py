@@ -11,10 +11,12 @@
 
 A kernel is an ordinary Python function on scalars, arrays and named tuples. Decorated with
 `compiled` it runs as machine code, compiled at its first call and cached on disk for the next
-process. A kernel may call kernels, and use numbers, of this folder and of its own: the cache is
-renewed when a file of either changes. Where no folder for a cache can be written, neither beside
-the sources nor at home, each process compiles anew. numba (60 MB) is loaded by the first call of a
-kernel. The environment variable ``NUMBA_DISABLE_JIT=1`` runs kernels as plain Python instead.
+process. It loops over its arrays: for an expression of whole arrays numba compiles broadcasting and
+messages about shapes as well, for seconds. A kernel may call kernels, and use numbers, of this
+folder and of its own: the cache is renewed when a file of either changes. Where no folder for a
+cache can be written, neither beside the sources nor at home, each process compiles anew. numba
+(60 MB) is loaded by the first call of a kernel. The environment variable ``NUMBA_DISABLE_JIT=1``
+runs kernels as plain Python instead.
 """
 
 import contextlib

@@ -104,11 +104,7 @@ from valve_friction_ros.identification.trust.verdict import (
 from valve_friction_ros.identification.units import SLIDING
 from valve_friction_ros.model.recording import Recording, StampedRecord, StampedSignal
 from valve_friction_ros.model.valve import KarnoppParameters, Valve
-from valve_friction_ros.signals import (
-    MeasuredRecord,
-    as_sent_on_change,
-    measured,
-)
+from valve_friction_ros.signals import MeasuredRecord, as_sent_on_change, measured
 
 _WINDOWS, _SHORTEST_WINDOW = 10, 3
 """Means of the position in which a record must show both directions, and the fewest samples in one:

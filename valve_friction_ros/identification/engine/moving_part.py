@@ -10,7 +10,7 @@
 """The part of a record that is fitted: around the motion of the stem, and of a bounded length."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from valve_friction_ros.identification.result import Pause
 from valve_friction_ros.model.recording import StampedRecord, StampedSignal
-from valve_friction_ros.signals import runs_of, stamped_noise
+from valve_friction_ros.signals import all_around, runs_of, stamped_noise
 
 _AROUND = 2.0
 _END = 20
@@ -87,11 +87,11 @@ def moving_part(record: StampedRecord) -> MovingPart:
     if _duration(record) <= longest:
         return MovingPart(record)
     windows = _Windows.of(record, period)
-    rests = windows.rests()
-    motion = _duration(record) - sum(end - begin for begin, end in rests)
+    edges, rests = windows.edges, windows.rests()
+    motion = _duration(record) - sum(float(edges[last] - edges[first]) for first, last in rests)
     begin, end = windows.furthest(rests, longest)
-    inside = [(max(a, begin), min(b, end)) for a, b in rests if a < end and b > begin]
-    return MovingPart(*_without(_between(record, begin, end), inside), motion)
+    inside = [(edges[first], edges[last]) for first, last in rests if begin <= first < end]
+    return MovingPart(*_without(_between(record, edges[begin], edges[end]), inside), motion)
 
 
 def _duration(record: StampedRecord) -> float:
@@ -168,35 +168,31 @@ class _Windows(NamedTuple):
     def _beyond(self, noises: float, share: float) -> float:
         return max(noises * self.noise, share * self.span)
 
-    def rests(self) -> list[tuple[float, float]]:
-        """Return begin and end, s, of each rest, without one window beside the motion."""
+    def rests(self) -> list[list[int]]:
+        """Return first and one-past-last window of each rest, without one beside the motion."""
         crept = np.abs(np.diff(self.mean)) > self._beyond(_CREPT_NOISE, _CREPT_SHARE)
         moves = self.range > self._beyond(_MOVED_NOISE, _MOVED_SHARE)
         moves[1:] |= crept
         moves[:-1] |= crept
-        about = moves.copy()
-        about[1:] |= moves[:-1]
-        about[:-1] |= moves[1:]
         same = self._beyond(_SAME_NOISE, _SAME_SHARE)
         return [
-            (float(self.edges[first]), float(self.edges[last]))
-            for first, last in runs_of(~about)
+            [first, last]
+            for first, last in runs_of(all_around(~moves, 1))
             if abs(self.mean[last - 1] - self.mean[first]) < same
         ]
 
-    def furthest(self, rests: Sequence[tuple[float, float]], longest: float) -> tuple[float, float]:
-        """Return begin and end, s, of the stretch of at most so much motion of the longest way."""
+    def furthest(self, rests: Iterable[Sequence[int]], longest: float) -> tuple[int, int]:
+        """Return first and one-past-last window of the longest way in so much motion, s."""
         kept = np.ones(self.mean.size, dtype=np.bool_)
-        for begin, end in rests:
-            kept &= (self.edges[:-1] < begin) | (self.edges[:-1] >= end)
+        for first, last in rests:
+            kept[first:last] = False
         where = np.flatnonzero(kept)
-        length = float(self.edges[1] - self.edges[0])
-        count = max(int(longest / length), 1)
+        count = max(int(longest / float(self.edges[1] - self.edges[0])), 1)
         if where.size <= count:
-            return float(self.edges[0]), float(self.edges[-1])
+            return 0, self.mean.size
         way = np.concatenate([[0.0], np.cumsum(self.range[where])])
         best = int(np.argmax(way[count:] - way[:-count]))
-        return float(self.edges[where[best]]), float(self.edges[where[best + count - 1] + 1])
+        return int(where[best]), int(where[best + count - 1]) + 1
 
 
 def _without(

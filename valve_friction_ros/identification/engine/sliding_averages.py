@@ -20,7 +20,12 @@ from valve_friction_ros.identification.engine.lags import LAGS, LARGEST_LAG
 from valve_friction_ros.identification.trust.uncertainty import MEDIAN_MAGNITUDE
 from valve_friction_ros.model.recording import StampedRecord, StampedSignal
 from valve_friction_ros.model.valve import Valve
-from valve_friction_ros.signals import quantisation_step, stamped_noise, without_repeats
+from valve_friction_ros.signals import (
+    all_around,
+    quantisation_step,
+    stamped_noise,
+    without_repeats,
+)
 
 _Array = NDArray[np.float64]
 
@@ -125,13 +130,6 @@ def _lengths(seen: _Array, measured: _Array, turns: NDArray[np.intp]) -> _Array:
     other half says: noise makes the extremes of a half, and not the other's values there.
     """
     return np.asarray(np.diff(measured[turns]) * np.sign(np.diff(seen[turns])))
-
-
-def _all_around(which: NDArray[np.bool_], reach: int) -> NDArray[np.bool_]:
-    """Return where all samples up to `reach` before and after are set."""
-    sums = np.concatenate([[0], np.cumsum(np.pad(which, reach, mode="edge"))])
-    width = 2 * reach + 1
-    return np.asarray(sums[width:] - sums[:-width] == width)
 
 
 class MeasuredSignal(NamedTuple):
@@ -263,7 +261,7 @@ def averages_of(
     }
     side = np.sign(mean) * (size > max(_SLIDES * speed, _SURELY * noise["velocity"]))
     reach = int(_MARGIN * length)
-    slides = _all_around(side > 0, reach) | _all_around(side < 0, reach)
+    slides = all_around(side > 0, reach) | all_around(side < 0, reach)
     free = away_from_stops(0.5 * (position[0] + position[1]), valve)
     free[:lost] = free[-lost:] = False
     taken = np.flatnonzero(slides & free)
