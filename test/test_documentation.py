@@ -214,7 +214,7 @@ def reports(tmp_path_factory):
     valve = ["--valve", str(EXAMPLES / "fv_101.yaml")]
     words = ["identify-folder", folder, *valve, "--output", folder / "plant.html"]
     command = [sys.executable, "-m", "valve_friction_ros", *words]
-    subprocess.run(command, check=False, timeout=100)
+    subprocess.run(command, check=False, timeout=300)
     return folder
 
 

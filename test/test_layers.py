@@ -196,7 +196,7 @@ def test_importing_the_core_loads_no_ros():
         capture_output=True,
         text=True,
         check=True,
-        timeout=60,
+        timeout=300,
     )
     loaded = {line.split()[0]: line.split()[1:] for line in done.stdout.splitlines()}
     assert [*loaded] == CORE

@@ -29,6 +29,7 @@ import pytest
 import rclpy
 import yaml
 from documentation import TEXT
+from waiting import PATIENCE
 
 from valve_friction_ros import __version__
 
@@ -45,7 +46,6 @@ EXECUTABLES = {
 }
 LAUNCH_FILES = ["bench.launch.py", "monitor.launch.py"]
 DOMAIN = 91
-PATIENCE = 30.0  # s, for one thing to happen on a loaded machine
 
 
 def setup_text():
@@ -391,7 +391,7 @@ def installed(tmp_path_factory):
         env=os.environ | {"COLCON_HOME": str(workspace / "colcon")},
         capture_output=True,
         text=True,
-        timeout=100,
+        timeout=300,
         check=False,
     )
     assert build.returncode == 0, build.stdout + build.stderr

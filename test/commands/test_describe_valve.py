@@ -115,7 +115,7 @@ def test_what_is_open_is_asked_for(tmp_path):
         input=answers,
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=300,
     )
     assert (done.returncode, done.stdout) == (0, f"{path}\n")
     assert "spring range (bench set) (0.2..1.0 bar, 3..15 psi) [none]: " in done.stderr
@@ -129,7 +129,7 @@ def asked(answers):
         input=answers,
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=300,
     )
 
 

@@ -15,15 +15,14 @@ import shutil
 import signal
 import subprocess
 import sys
-from functools import partial
 from pathlib import Path
 
 import pytest
-import waiting
 from dask_workers import identify, local_cluster
 from documentation import PROJECT
 from kept_rows import kept
 from local_server import certificate_pair
+from waiting import PATIENCE, wait_until
 
 from valve_friction_ros.commands import identify_folder
 from valve_friction_ros.fleet import cluster
@@ -32,7 +31,6 @@ distributed = pytest.importorskip("distributed", reason="run `make venv-cluster`
 dask = pytest.importorskip("dask")
 
 pytestmark = pytest.mark.timeout(300)  # processes start, die and come back
-PATIENCE = 100.0  # s, for one thing to happen on a loaded machine
 FAULTY = Path(__file__).with_name("faulty_cluster.py")
 SHORT = (PROJECT / "examples" / "five_seconds.csv").read_text()
 
@@ -58,9 +56,6 @@ def arguments(folder, tmp_path):
 def rows_of(path):
     with path.open(newline="") as stream:
         return {row["recording"]: row for row in csv.DictReader(stream)}
-
-
-wait_until = partial(waiting.wait_until, patience=PATIENCE)
 
 
 def test_the_rows_and_reports_of_the_local_run(address, tmp_path, command, monkeypatch):

@@ -19,14 +19,13 @@ import signal
 import subprocess
 import sys
 from collections import Counter
-from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
-import waiting
 from bags import messages_of, write_bag
 from kept_rows import kept
+from waiting import PATIENCE, wait_until
 
 from valve_friction_ros.commands.main import run as run_here
 from valve_friction_ros.identification import IdentificationSettings, identify_bench
@@ -42,7 +41,6 @@ from valve_friction_ros.records.recordings import read_recordings
 from valve_friction_ros.records.valve_file import read_valve_file
 
 PERIOD = 0.01
-PATIENCE = 60.0  # s, for one thing to happen on a loaded machine
 FAULTY = Path(__file__).with_name("faulty_fleet.py")
 
 
@@ -114,9 +112,6 @@ def rows_of(path):
 
 def done(path):
     return Counter((row["recording"], row["valve"]) for row in rows_of(path))
-
-
-wait_until = partial(waiting.wait_until, patience=PATIENCE)
 
 
 def children(process):

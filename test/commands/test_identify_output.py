@@ -135,7 +135,7 @@ def run(*arguments, code="from valve_friction_ros.commands.main import main"):
         [sys.executable, *how, "identify", *map(str, arguments)],
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=300,
         check=False,
     )
 

@@ -292,7 +292,7 @@ def run_browser(folder, *arguments):
         [*common, f"--user-data-dir={folder / 'profile'}", *map(str, arguments)],
         capture_output=True,
         text=True,
-        timeout=90,
+        timeout=300,
         check=False,
     )
     assert done.returncode == 0, done.stderr

@@ -412,7 +412,7 @@ class TestOneValve:
             [sys.executable, "-c", code, "identify", str(bag), "--valve", str(bench_yaml)],
             capture_output=True,
             text=True,
-            timeout=60,
+            timeout=300,
             check=False,
         )
         assert (done.returncode, done.stderr) == (0, "")

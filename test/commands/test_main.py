@@ -45,7 +45,7 @@ def start(*arguments, program=PROGRAM, **streams):
 
 def ended(process):
     """Exit code, stdout and stderr."""
-    out, err = process.communicate(timeout=60)
+    out, err = process.communicate(timeout=300)
     return process.returncode, out, err
 
 
@@ -224,7 +224,7 @@ class TestEnd:
         code = subprocess.run(
             ["sh", "-c", shell, "sh", sys.executable, EXTRA, "extra", "well"],
             capture_output=True,
-            timeout=60,
+            timeout=300,
             check=False,
         )
         assert code.returncode == 1

@@ -394,7 +394,7 @@ class TestDashboard:
                     assert not libraries.exists() or "llvmlite" not in libraries.read_text()
             finally:
                 process.terminate()
-                assert "Traceback" not in process.communicate(timeout=60)[1]
+                assert "Traceback" not in process.communicate(timeout=300)[1]
 
     def test_what_is_no_history_is_refused(self, tmp_path, capsys):
         assert run(["dashboard", str(tmp_path / "none.sqlite")]) == 2

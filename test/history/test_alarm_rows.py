@@ -105,7 +105,7 @@ def killed(path, step):
         capture_output=True,
         text=True,
         check=False,
-        timeout=60,
+        timeout=300,
     )
     return done.returncode, len(done.stdout.split("\n")) - 1
 

@@ -276,7 +276,7 @@ def test_without_a_server_its_library_is_not_loaded(tmp_path):
         capture_output=True,
         text=True,
         check=True,
-        timeout=60,
+        timeout=300,
     )
     assert done.stdout == "False\n"
 

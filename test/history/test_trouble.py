@@ -110,7 +110,7 @@ def test_a_file_that_may_not_grow(history):
         [sys.executable, "-c", LIMITED, str(history.path), *map(str, FOLDERS)],
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=300,
         check=False,
     )
     assert run.returncode == 0, run.stderr
@@ -157,7 +157,7 @@ def test_read_only_folder():
             [sys.executable, "-c", READ_ONLY, name, *map(str, FOLDERS)],
             capture_output=True,
             text=True,
-            timeout=60,
+            timeout=300,
             check=False,
         )
         folder.chmod(0o755)
@@ -319,7 +319,7 @@ def test_no_finished_row_is_lost_and_nothing_is_corrupted(tmp_path):
     try:
         finished = [finished_before_the_kill(process) for process in processes[:KILLED]]
         for process in processes[KILLED:]:
-            told, _ = process.communicate(timeout=90)
+            told, _ = process.communicate(timeout=300)
             assert process.returncode == 0
             finished.append(len(told.split()))
     finally:

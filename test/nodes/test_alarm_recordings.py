@@ -81,7 +81,7 @@ def alarmed(client, before=None):
 def paged(client, path):
     """Wait for the page of a recording; its text."""
     page = Path(path) / "report.html"
-    client.wait_until(page.exists, f"{page}", timeout=100)
+    client.wait_until(page.exists, f"{page}", timeout=300)
     return page.read_text(encoding="utf-8")
 
 
@@ -130,7 +130,7 @@ def test_an_alarm_is_recorded_and_the_whole_takes_the_place_of_its_first_part(li
         cwd=PROJECT,
         capture_output=True,
         text=True,
-        timeout=100,
+        timeout=300,
         check=False,
     )
     assert done.returncode == 0, done.stderr
@@ -245,7 +245,7 @@ def test_many_alarms_are_bounded_and_nothing_else_is_removed(live, tmp_path):
     node = restarted(live, node, {**chosen, "alarm_megabytes": 1.5 * size / 1e6})
     path = str(alarmed(client, path))
     expected = sorted([*others, Path(path).name])
-    client.wait_until(lambda: names(folder) == expected, "one recording", timeout=100)
+    client.wait_until(lambda: names(folder) == expected, "one recording", timeout=300)
     assert "Excess friction" in paged(client, path)
     restarted(live, node, {**chosen, "alarm_megabytes": 0.001})
     client.identified(HEALTHY)

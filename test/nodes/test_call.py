@@ -38,7 +38,7 @@ def start(domain, *arguments):
 
 def ended(process):
     """Exit code, stdout and stderr."""
-    out, err = process.communicate(timeout=60)
+    out, err = process.communicate(timeout=300)
     return process.returncode, out, err
 
 

@@ -402,7 +402,7 @@ def test_the_figures_outlive_a_kill(live, tmp_path):
         cwd=PROJECT,
         capture_output=True,
         text=True,
-        timeout=100,
+        timeout=300,
         check=False,
     )
     assert "stem_command: 6 steps, 0 ignored; medians: dead time 1" in shown.stdout, shown.stderr

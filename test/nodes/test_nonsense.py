@@ -16,6 +16,7 @@ import rclpy
 from histories import START, success
 from live_nodes import STREAM, values_of
 from sensor_msgs.msg import FluidPressure, JointState
+from waiting import PATIENCE
 
 from benchmark.soak.feed import PERIOD, TOLD_WITHIN, Nonsense, said
 from valve_friction_ros.health import Baseline
@@ -152,8 +153,8 @@ def node(live, history):
 
 def test_nonsense_is_told_within_5_s_cleared_after_it_and_nothing_else_is(live, node, sensors):
     plant = Plant(live.client, sensors)
-    plant.spin(sensors.are_connected, "connections", 40.0)
-    plant.spin(plant.is_calm, "calm", 40.0)
+    plant.spin(sensors.are_connected, "connections", PATIENCE)
+    plant.spin(plant.is_calm, "calm", PATIENCE)
 
     plant.require_told()
     assert plant.is_calm((SLOW, STILL, PLAYED))

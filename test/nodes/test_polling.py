@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 import rclpy
 import waiting
-from live_nodes import PATIENCE, SECOND, Client, Domain, time_of
+from live_nodes import SECOND, Client, Domain, time_of
 from rclpy.duration import Duration
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.qos import QoSProfile
@@ -25,6 +25,7 @@ from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import FluidPressure, JointState
 from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
+from waiting import PATIENCE
 
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.nodes.identifier.valve_inputs import ValveInputs
@@ -57,7 +58,7 @@ def bench():
 
 
 def wait_until(condition, what):
-    return waiting.wait_until(condition, lambda: what, PATIENCE)
+    return waiting.wait_until(condition, lambda: what)
 
 
 def sender(client, polled):

@@ -59,7 +59,7 @@ def identified(*arguments):
         cwd=PROJECT,
         capture_output=True,
         text=True,
-        timeout=100,
+        timeout=300,
         check=False,
     )
     assert (done.returncode, done.stderr) == (0, "")

@@ -267,7 +267,7 @@ def python(code, *arguments, **environment):
         capture_output=True,
         text=True,
         check=True,
-        timeout=100,
+        timeout=300,
     )
     assert done.stderr == ""
     return done.stdout

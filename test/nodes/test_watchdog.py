@@ -17,9 +17,10 @@ import time
 
 import pytest
 from faulty_identifier import BLOCK, CLEAN_UP, FINISH, FREEZE, LOOP, MIDDLEWARE, faulty
-from live_nodes import NAMESPACE, PATIENCE, values_of
+from live_nodes import NAMESPACE, values_of
 from records import quick_record
 from std_srvs.srv import Trigger
+from waiting import PATIENCE
 
 from valve_friction_ros.nodes.plumbing.worker import Worker, workers_have_ended
 

@@ -40,7 +40,7 @@ def without_libraries(monkeypatch, tmp_path):
 
 def identify(*arguments):
     command = [sys.executable, "-m", "valve_friction_ros", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=100, check=False)
+    return subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
 
 
 @pytest.mark.parametrize(

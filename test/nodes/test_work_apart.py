@@ -19,9 +19,8 @@ import time
 from pathlib import Path
 
 import pytest
-from live_nodes import PATIENCE
 from records import quick_record
-from waiting import wait_until
+from waiting import PATIENCE, wait_until
 
 from valve_friction_ros.health import (
     FrictionMonitor,
@@ -107,7 +106,7 @@ def test_a_process_ends_when_nobody_needs_it(monkeypatch):
     processes = Processes()
     first = processes.done(os.getpid)
     # not even as a zombie
-    wait_until(lambda: not Path(f"/proc/{first}").exists(), patience=PATIENCE)
+    wait_until(lambda: not Path(f"/proc/{first}").exists())
     assert processes.done(os.getpid) != first
     processes.end()
 
@@ -127,7 +126,7 @@ def test_it_ends_with_its_parent_though_it_works():
         [sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=PATIENCE
     )
     assert parent.returncode == -signal.SIGKILL
-    wait_until(lambda: not is_running(int(parent.stdout)), patience=PATIENCE)
+    wait_until(lambda: not is_running(int(parent.stdout)))
 
 
 def is_running(process):
@@ -182,7 +181,7 @@ def test_what_is_compiled_without_a_place_is_known_here(monkeypatch):
     monkeypatch.setattr(workers_module, "find_cache", no_cache)
     monkeypatch.setattr(workers_module, "compile_methods", os.getpid)
     with running_workers(processes=1) as workers:
-        wait_until(lambda: not workers.identify.is_preparing, patience=PATIENCE)
+        wait_until(lambda: not workers.identify.is_preparing)
         assert not compiled.kernels_are_cached()
 
 

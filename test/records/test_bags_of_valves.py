@@ -251,7 +251,7 @@ def test_a_file_that_may_not_grow(tmp_path):
         env=environment,
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=300,
         check=True,
     )
     assert (done.stdout, done.stderr) == ("File too large\n", "")

@@ -11,8 +11,8 @@
 
 import time
 
-PATIENCE = 60.0
-"""Time for one thing to happen on a loaded machine, s."""
+PATIENCE = 120.0
+"""Time for one thing to happen on a slow and loaded machine, s."""
 
 
 def wait_until(condition, told=lambda: "", patience=PATIENCE, turn=0.01):
