@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""What a method offers to figures and reports: data that they draw for every method alike."""
+"""Data that every method gives to figures and reports, which draw all methods alike."""
 
 import math
 from collections.abc import Mapping
@@ -57,7 +57,7 @@ class Curve(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Panel:
-    """A panel of its own; the panels of a drawing share their x axis.
+    """A separate panel; the panels of a drawing share their x axis.
 
     Attributes
     ----------
@@ -70,11 +70,11 @@ class Panel:
     title : str
         Text above the panel.
     chosen : float or None
-        Place on the x axis that the method chose.
+        Value on the x axis that the method chose.
     level : Parameter or None
         Parameter on the y axis, drawn with its interval and verdict.
     is_logarithmic : bool
-        Whether the y axis is.
+        Whether the y axis is logarithmic.
     is_detail : bool
         Whether only a report shows the panel.
     """
@@ -92,22 +92,22 @@ class Panel:
 
 @dataclass(frozen=True, eq=False)
 class Drawing:
-    """What is drawn beside the record and the simulated stem; empty for a method without more.
+    """Evidence drawn beside the record and the simulated stem; empty for a method without any.
 
     Attributes
     ----------
     panels : tuple of Panel
-        Panels of their own.
+        Separate panels.
     heading, caption, alt : str
         Heading, caption and description of these panels in a report.
     region : tuple of float or None
         Part of their x axis that a report shades.
     stem : tuple of Curve
-        Drawn on the stem position, m, over the time, s.
+        Curves of stem position, m, over time, s.
     stem_title : str
         What the stem's panel shows.
     loop : tuple of Curve
-        Drawn on the stem position, m, over the drive, Pa or N.
+        Curves of stem position, m, over the drive, Pa or N.
     loop_title, loop_caption : str
         What the loop shows, in a figure and in a report.
     settings : mapping of str to str
@@ -131,7 +131,7 @@ class Exhibit(Protocol):
     """The evidence of a method, such as a sweep or a valve signature."""
 
     def drawing(self, parameters: Mapping[str, Parameter], valve: Valve) -> Drawing:
-        """Return what is drawn of it, beside these parameters of the result."""
+        """Return the drawing of this evidence, with these parameters of the result."""
 
 
 FRICTION_CURVE = "friction_curve"
@@ -160,15 +160,15 @@ def friction_drawing(
     Parameters
     ----------
     drawing : Drawing
-        What else is drawn of the result.
+        The other curves and panels of the result.
     evidence : mapping of str to object
-        That of the result: the friction curve, which may be empty, and the lag of the fit.
+        Evidence of the result: the friction curve, which may be empty, and the lag of the fit.
     parameters : mapping of str to Parameter
         Parameters of the result: the fitted law, with its band.
     model : KarnoppParameters or None
-        What the result was simulated with, for values that the record does not determine.
+        Model of the simulation, for values that the record does not determine.
     sliding_speed : float
-        Speed that the sliding friction belongs to, m/s.
+        Speed at which the sliding friction holds, m/s.
     """
     curve = evidence[FRICTION_CURVE]
     if not curve:
@@ -213,7 +213,7 @@ def _viscous_by_lag(
     parameters: Mapping[str, Parameter],
     model: KarnoppParameters | None,
 ) -> float:
-    """Return what the curve lacks of F_v, N·s/m, as it takes another lag than the fit.
+    """Return the F_v, N·s/m, that the curve lacks because its lag differs from that of the fit.
 
     While the stem slides, a stem that is seen later by τ looks as one with less F_v by k·τ.
     """
@@ -261,7 +261,7 @@ def _law(
 
 
 def _known(parameter: Parameter | None, otherwise: float) -> tuple[float, float]:
-    """Value and half width of a number, also of one that is withheld; nan where there is none."""
+    """Value and half width of a parameter, even if withheld; nan where there is none."""
     if parameter is None:
         return otherwise, math.nan
     if math.isfinite(parameter.value):

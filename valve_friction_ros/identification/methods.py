@@ -58,7 +58,7 @@ METHODS: Mapping[str, Method] = MappingProxyType(
 
 
 def method_named(name: str) -> Method:
-    """Return the method of this name; those of earlier versions are understood.
+    """Return the method of this name; names of earlier versions are understood.
 
     Raises
     ------
@@ -86,8 +86,8 @@ def identify(
     valve : Valve
         Geometry.
     settings : IdentificationSettings or str, optional
-        What is known beforehand, and the settings of the sweep; or the name of the method, where
-        there is nothing to set.
+        Prior knowledge and the settings of the sweep; or the name of the method, if there is
+        nothing to set.
     method : str
         ``plant``, with the imperfections of a plant in the fit; ``bench``, with the Karnopp model
         alone; ``published``, the paper's model 1; or ``signature``, the paper's model 2, from a

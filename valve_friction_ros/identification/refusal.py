@@ -26,4 +26,4 @@ class RefusalError(Exception):
 
 
 class LittleMotionError(RefusalError):
-    """A record is too short, or its valve moves too little: no fault, as valves mostly rest."""
+    """A record is too short, or its valve moves too little: no fault, since valves mostly rest."""

@@ -26,11 +26,11 @@ if TYPE_CHECKING:
 
 _HEADER = ("parameter", "value", "± 95 %", "unit", "verdict", "published")
 _ALIGNED_RIGHT = (1, 2, 5)
-"""Places of the columns of numbers in `_HEADER`."""
+"""Indices of the numeric columns in `_HEADER`."""
 
 
 def plain(value: object) -> Any:
-    """Return a value in types of JSON; a number that is not finite becomes None."""
+    """Return a value in JSON types; a number that is not finite becomes None."""
     if isinstance(value, Mapping):
         return {str(name): plain(each) for name, each in value.items()}
     if isinstance(value, Enum):
@@ -59,7 +59,7 @@ def parameter_mapping(parameter: Parameter) -> dict[str, Any]:
 
 
 def parameter_columns(name: str, shown: Mapping[str, Any] | None) -> dict[str, Any]:
-    """Return a parameter as columns of a table of rows, with the unit in their names.
+    """Return a parameter as columns of a table, with the unit in their names.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def parameter_columns(name: str, shown: Mapping[str, Any] | None) -> dict[str, A
 
 
 def parameter_cells(name: str, parameter: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return a parameter as texts: name, value, half width, unit, verdict, published value."""
+    """Return the cells of a parameter: name, value, half width, unit, verdict, published value."""
     value, width, published = (parameter[key] for key in ("value", "half_width", "published"))
     return (
         name,
@@ -131,7 +131,7 @@ def text_of(shown: Mapping[str, Any], findings: Sequence[str]) -> str:
 
 
 def html_of(shown: Mapping[str, Any]) -> str:
-    """Return the table of the parameters as HTML; text from outside is escaped."""
+    """Return the table of the parameters as HTML; external text is escaped."""
 
     def row(cells: tuple[str, ...], tag: str) -> str:
         written = (

@@ -49,14 +49,14 @@ if TYPE_CHECKING:
 
 
 class Pause(NamedTuple):
-    """A rest that was left out of a record: when, s, and its length, s."""
+    """A rest that was left out of a record: its beginning, s, and its length, s."""
 
     time: float
     length: float
 
 
 class StemComparison(NamedTuple):
-    """Measured position, as the identification took it, and the model's.
+    """Measured position, as used in the identification, and simulated position.
 
     Attributes
     ----------
@@ -67,7 +67,7 @@ class StemComparison(NamedTuple):
     start : float
         Time of the first sample since the record began, s.
     pauses : tuple of Pause
-        Rests that were left out, on a time without those before them.
+        Rests that were left out; the time of each excludes the earlier rests.
     """
 
     sample_period: float
@@ -116,19 +116,19 @@ class Result:
     settings : IdentificationSettings
         Settings of the identification.
     parameters : mapping of str to Parameter
-        By name: those of `UNITS`, the extensions that the record demanded, `sliding_friction`. The
-        uncertainties of area and sensor scales in `settings` are in their intervals, and what its
-        stated values contradict, or what depends on an assumed area, is weak at most.
+        By name: those of `UNITS`, the extensions that the record demanded, `sliding_friction`.
+        Their intervals include the uncertainties of area and sensor scales in `settings`. A
+        parameter that contradicts a stated value or depends on an assumed area is weak at most.
     fit : float
         Share of the stem's movement that the model reproduces, at most 1; of the force where no
         stem is simulated.
     rms : float
         Root mean square of simulated minus measured position, m; nan where no stem is simulated.
     misfit : Misfit or None
-        A test of the model, by the stem or, without a spring, by the force; None in a method
-        without one.
+        Test of the model against the stem or, without a spring, against the force; None in a
+        method without this test.
     derivative_window : int
-        Derivative window that was used, samples; 0 in a method without derivatives.
+        Derivative window in use, samples; 0 in a method without derivatives.
     warnings : tuple of str
         Limitations of the numbers, one sentence each.
     evidence : mapping of str to object
@@ -138,14 +138,14 @@ class Result:
     model : KarnoppParameters or None
         The identified model, to simulate; None where a value is impossible.
     exhibit : Exhibit or None
-        What figures and reports draw beside record and stem, such as a sweep or a valve signature.
+        Evidence drawn beside record and stem, such as a sweep or a valve signature.
     stem : StemComparison or None
         Measured and simulated stem; None where no stem is simulated.
     sliding_speed : float
-        Mean speed of the stem over the distance, ∫|v|·|dx| / ∫|dx|, m/s: the speed that
-        `sliding_friction` belongs to; nan where it is unknown.
+        Mean speed of the stem over the distance, ∫|v|·|dx| / ∫|dx|, m/s: the speed at which
+        `sliding_friction` holds; nan where it is unknown.
     stated_by : IdentificationSettings or None
-        The settings whose stated values have been applied, once: a changed copy has them already.
+        Settings whose stated values have been applied, so that a changed copy applies them once.
 
     Examples
     --------
@@ -186,7 +186,7 @@ class Result:
         parameters, evidence = with_calibration(
             self.parameters, self.evidence, self.settings, self.recording.driven_by
         )
-        if self.stated_by != self.settings:  # else a changed copy, of a result that has
+        if self.stated_by != self.settings:  # else a copy of a result that has them applied
             parameters, told, sentences = with_stated(
                 parameters, self.settings.stated, self.settings.assumed, self.valve, self.recording
             )
@@ -203,11 +203,11 @@ class Result:
         return {name: parameter.value for name, parameter in self.parameters.items()}
 
     def difference(self, other: "Result") -> dict[str, tuple[float, float]]:
-        """Return this result less another one of the same sensors, by parameter.
+        """Return this result minus another of the same sensors, by parameter.
 
-        Each is the difference and half the width of its 95 % interval, SI units. Errors of area and
-        sensor scales are common to both and left out; the others are taken as independent.
-        Parameters that one of the two does not know are not there.
+        Each entry is the difference and half the width of its 95 % interval, SI units. Errors of
+        area and sensor scales are common to both and left out; other errors are taken as
+        independent. Parameters that either result does not know are omitted.
         """
         found = {}
         for name, one in self.parameters.items():
@@ -221,14 +221,14 @@ class Result:
         return found
 
     def correlation(self) -> "pd.DataFrame":
-        """Return how the errors of the numbers go together, −1 to 1.
+        """Return the correlation of the errors of the parameters, −1 to 1.
 
-        It is that of the most probable place, where the model is taken as linear.
+        It is evaluated at the most probable estimate, where the model is linearised.
 
         Raises
         ------
         RefusalError
-            If the method tells none: the published one and the signature's judge each number alone.
+            If the method gives none: ``published`` and ``signature`` judge each number alone.
         """
         import pandas as pd  # noqa: PLC0415 - slow to import
 
@@ -241,16 +241,16 @@ class Result:
         return pd.DataFrame(found["matrix"], found["names"], found["names"])
 
     def covariance(self) -> "pd.DataFrame":
-        """Return the covariance of the numbers that are known, SI units.
+        """Return the covariance of the identified parameters, SI units.
 
-        The deviations are the standard errors of the parameters, which hold all that widens their
-        intervals, the correlation is that of `correlation`. A parameter that is fixed or not
-        identifiable is not there.
+        The standard deviations are the standard errors of the parameters, which include everything
+        that widens their intervals; the correlation is that of `correlation`. A parameter that is
+        fixed or not identifiable is omitted.
 
         Raises
         ------
         RefusalError
-            If the method tells no correlation.
+            If the method gives no correlation.
         """
         whole = self.correlation()
         errors = {
@@ -263,7 +263,7 @@ class Result:
         return whole * np.outer(deviation, deviation)
 
     def against(self, other: "Result") -> ModelComparison:
-        """Return how much more probable this model is than that of another result of the record.
+        """Return how much more probable this model is than another model of the same record.
 
         Parameters
         ----------
@@ -323,7 +323,7 @@ class Result:
     def stem_band(
         self, drive: NDArray[np.float64], sample_period: float, draws: int = 40
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return between which positions the simulated stem lies, as far as its model is known.
+        """Return the 95 % band of the simulated stem due to the uncertainty of its model.
 
         Parameters
         ----------
@@ -332,18 +332,18 @@ class Result:
         sample_period : float
             Time between two samples, s.
         draws : int
-            Models that are drawn by the covariance of the parameters.
+            Number of models drawn from the covariance of the parameters.
 
         Returns
         -------
         tuple of ndarray of float, shape (n,)
-            Ends of the 95 % interval at each sample, m. What the model leaves of the record, and
-            noise of the sensor, come on top.
+            Limits of the 95 % interval at each sample, m. Model error and sensor noise come on
+            top.
 
         Raises
         ------
         RefusalError
-            If there is no model, or the method tells no correlation.
+            If there is no model, or the method gives no correlation.
         """
         model, spread = self.simulated_model(), self.covariance()
         names = [one.name for one in fields(model) if one.name in spread.index]
@@ -409,7 +409,7 @@ class Result:
 
     @property
     def drawing(self) -> Drawing:
-        """What is drawn of the evidence: the friction curve where there is one, or the exhibit."""
+        """Drawing of the evidence: the friction curve where there is one, or the exhibit."""
         own = self.exhibit and self.exhibit.drawing(self.parameters, self.valve)
         if FRICTION_CURVE not in self.evidence:
             return own or Drawing()
@@ -491,7 +491,7 @@ def _describes(result: Result) -> bool:
 
 
 def _free_parameters(result: Result) -> int:
-    """Count what the fit has chosen: what was not given, and imperfections that were tried."""
+    """Count the free parameters of the fit: those not given, and the imperfections tried."""
     found: Any = result.evidence.get(IMPERFECTIONS_FOUND, {})
     free = [name for name in result.parameters if name not in result.settings.fixed]
     return len(set(free) - {SLIDING, "limit_velocity"}) + len(found)

@@ -30,13 +30,13 @@ REGRESSED = (
     "spring_constant",
     "spring_preload",
 )
-"""Parameters of the regression: (3), and the preload F_0 beside them."""
+"""Parameters of the regression: those of (3), and the preload F_0."""
 
 FIXABLE = (*REGRESSED, "static_friction", "limit_velocity")
 """Parameters that can be fixed at a known value instead of being identified."""
 
 STATED = ("spring_constant", "spring_preload", "mass")
-"""Parameters of a data sheet, with which what is found can be compared."""
+"""Data-sheet parameters that can be compared with identified values."""
 
 CALIBRATION: Mapping[str, str] = MappingProxyType(
     {
@@ -45,10 +45,10 @@ CALIBRATION: Mapping[str, str] = MappingProxyType(
         "position_scale_uncertainty": "the scale of the position sensor",
     }
 )
-"""Settings that are relative standard uncertainties, and of what."""
+"""Settings that are relative standard uncertainties, and the quantity of each."""
 
 METHOD_NAMES = ("plant", "bench", "published", "signature")
-"""What the methods are called, in the order in which they are offered."""
+"""Names of the methods, in the order in which they are offered."""
 
 DEFAULT_METHOD = "plant"
 
@@ -61,16 +61,16 @@ FORMER_METHODS: Mapping[str, str] = MappingProxyType(
         "force_balance": "signature",
     }
 )
-"""Names that files, settings and histories of earlier versions use, and what they are now."""
+"""Method names in files, settings and histories of earlier versions, and their current names."""
 
 TIMING_UNCERTAINTY = 0.04
-"""Timing uncertainty without a setting, s.
+"""Default timing uncertainty of a plant, s.
 
 Chosen: stamps, transmitters and tubing of a plant without special care add up to some tens of
 milliseconds; 95 % are below 0.08 s."""
 
 MOST_UNCERTAIN = 0.5
-"""Relative standard uncertainty of a scale from which its 95 % interval holds zero."""
+"""Relative standard uncertainty of a scale from which its 95 % interval includes zero."""
 
 _MAY_BE_NEGATIVE = ("spring_preload",)
 _POSITIVE = ("mass", "limit_velocity")
@@ -96,21 +96,22 @@ class IdentificationSettings:
         ``limit_velocity`` sets the threshold δv instead of choosing it from the sweep.
     stated : mapping of str to float
         Values of a data sheet by name (see `STATED`). They take no part in the identification: a
-        found value that contradicts one gives a warning with the likely cause. What is fixed is
-        not compared.
+        found value that contradicts one gives a warning with the likely cause. Fixed parameters
+        are not compared.
     assumed : tuple of str
-        Names of fields of the `Valve` that nobody has stated: the result says so, and what depends
-        on an assumed area or pressure reference is weak at most.
+        Fields of the `Valve` that were assumed, not stated: the result says so, and a number that
+        depends on an assumed area or pressure reference is weak at most.
     position_bias : float, optional
-        Bias x̄ of (10), m. Given, the methods ``published`` and ``signature`` take the paper's form
-        of four columns, F_0 = k·x̄; by default, and in the other methods, the preload is found.
+        Bias x̄ of (10), m. If it is given, the methods ``published`` and ``signature`` use the
+        paper's form with four columns, F_0 = k·x̄; by default, and in the other methods, the
+        preload is identified.
     assumed_mass : float
         Mass, kg, above zero; used where the record does not determine the mass.
     timing_uncertainty : float, optional
         Standard deviation, s, of the whole time by which one signal may lag the other: clocks,
-        damping of transmitters, a volume before the diaphragm. The methods ``plant`` and ``bench``
-        use it, by default 0.04 s, a plant without special care, and zero: on a bench the signals
-        certainly belong together.
+        damping of transmitters, a volume before the diaphragm. Used by the methods ``plant``
+        (default 0.04 s, a plant without special care) and ``bench`` (default zero: on a bench the
+        signals are surely synchronous).
     area_uncertainty, drive_scale_uncertainty, position_scale_uncertainty : float
         Relative standard uncertainties (GUM), 0.02 for 2 %, of the diaphragm area, of the scale of
         the pressure sensor (for a drive that is a force: of the force sensor), and of the scale of
@@ -186,12 +187,12 @@ class IdentificationSettings:
 
 
 def current_name(method: str) -> str:
-    """Return what a method is called now, whatever it was called; other names as they are."""
+    """Return the current name of a method; other names are returned unchanged."""
     return FORMER_METHODS.get(method, method)
 
 
 def _checked(values: Mapping[str, float], names: tuple[str, ...], what: str) -> dict[str, float]:
-    """Return the values of parameters as finite numbers with their signs."""
+    """Return the values of parameters, checked to be finite and of the right sign."""
     checked = {}
     for name, value in values.items():
         if name not in names:

@@ -16,7 +16,7 @@ SLIDING = "sliding_friction"
 """Parameter name: ∫|F_friction|·|dx| / ∫|dx| over the record, N."""
 
 CLOCK_OFFSET = "clock_offset"
-"""Parameter name. Its value, s, is positive where the stem's stamps are late."""
+"""Parameter name. Its value, s, is positive if the stem's time stamps are late."""
 
 UNITS: Mapping[str, str] = MappingProxyType(
     {
@@ -40,7 +40,7 @@ PARAMETER_UNITS: Mapping[str, str] = MappingProxyType(
         SLIDING: "N",
     }
 )
-"""Unit of every parameter that a result can hold; those after `UNITS` only if demanded."""
+"""Unit of every parameter that a result can hold; those after `UNITS` appear only if demanded."""
 
 _SUFFIXES = {
     "kg": "_kg",
@@ -53,5 +53,5 @@ _SUFFIXES = {
 
 
 def column_suffix(parameter: str) -> str:
-    """Return the unit of a parameter as it ends the name of a column; empty for a pure number."""
+    """Return the unit of a parameter as a column-name suffix; empty for a pure number."""
     return _SUFFIXES.get(PARAMETER_UNITS.get(parameter, ""), "")

@@ -30,13 +30,13 @@ range."""
 _LONGEST = 640.0
 _LONGEST_SAMPLES = 16_000
 _LONGEST_OF_ALL = 5_000.0
-"""Time, s, of motion that is fitted; or so many samples, if they are slow; and never a longer time.
+"""Longest motion that is fitted: in s, in samples if they are slow, and in s however slow they are.
 
 Chosen: with 32,000 steps of 20 ms and more, what the steps lose of the corners of the pressure
 outweighs the noise, and F_v comes out several intervals wrong; 5,000 s take 5 s."""
 
 _WINDOW_SAMPLES, _WINDOWS = 20, 2000
-"""Samples in a window in which the stem rests or moves, at least; and windows in a record."""
+"""Fewest samples in a window in which the stem rests or moves; most windows in a record."""
 
 _CREPT_NOISE, _CREPT_SHARE = 1.5, 2e-4
 """Distance between the means of two windows of a stem that creeps, as for `_MOVED_NOISE`."""
@@ -46,12 +46,12 @@ _SAME_NOISE, _SAME_SHARE = 2.0, 2e-3
 
 
 class MovingPart(NamedTuple):
-    """What is fitted of a record.
+    """The part of a record that is fitted.
 
     Attributes
     ----------
     record : StampedRecord
-        Samples; later ones are earlier by the pauses that were left out before them.
+        Samples, each shifted earlier by the pauses that were left out before it.
     pauses : tuple of Pause
         Rests that were left out, on the time of `record`.
     motion : float
@@ -74,12 +74,12 @@ class MovingPart(NamedTuple):
 
 
 def moving_part(record: StampedRecord) -> MovingPart:
-    """Return what is fitted of a record.
+    """Return the part of a record that is fitted.
 
-    A stem at rest, at a stop above all, says nothing of its friction, so the record begins and ends
-    with its motion. A record of hours is shortened further: rests are left out, and if it is still
-    too long, the stretch is taken in which the stem travels furthest. More motion would cost time
-    and make no number better, as the steps of the simulation grow with it.
+    A stem at rest, above all at a stop, shows nothing of its friction, so the part begins and ends
+    with motion. A record of hours is shortened further: rests are left out, and if it is still too
+    long, the stretch in which the stem travels furthest is taken. More motion would cost time and
+    improve no number, as the steps of the simulation grow with it.
     """
     record = _around_motion(record)
     period = max(record.drive.period, record.position.period)
@@ -123,7 +123,7 @@ def _between(record: StampedRecord, begin: float, end: float) -> StampedRecord:
 
 
 class _Windows(NamedTuple):
-    """Equal windows of a record, and what the stem does in each.
+    """Equal windows of a record, and the motion of the stem in each.
 
     Attributes
     ----------
@@ -144,12 +144,12 @@ class _Windows(NamedTuple):
 
     @classmethod
     def of(cls, record: StampedRecord, period: float) -> "_Windows":
-        """Divide a record whose slower signal has that period."""
+        """Divide a record whose slower signal has this period."""
         stem = record.position
         duration = _duration(record)
         least = max(_AROUND, _WINDOW_SAMPLES * period, duration / _WINDOWS)
         length = math.ceil(least / period) * period
-        # Between two samples, so that what is joined keeps its period.
+        # Between two samples, so that joined parts keep the sample period.
         edges = stem.time[0] + np.arange(int(duration / length) + 2) * length - 0.5 * period
         first = np.searchsorted(stem.time, edges[:-1])
         full = np.flatnonzero(np.diff(first, append=stem.time.size))
@@ -169,7 +169,7 @@ class _Windows(NamedTuple):
         return max(noises * self.noise, share * self.span)
 
     def rests(self) -> list[list[int]]:
-        """Return first and one-past-last window of each rest, without one beside the motion."""
+        """Return first and one-past-last window of each rest, without windows next to motion."""
         crept = np.abs(np.diff(self.mean)) > self._beyond(_CREPT_NOISE, _CREPT_SHARE)
         moves = self.range > self._beyond(_MOVED_NOISE, _MOVED_SHARE)
         moves[1:] |= crept
@@ -182,7 +182,7 @@ class _Windows(NamedTuple):
         ]
 
     def furthest(self, rests: Iterable[Sequence[int]], longest: float) -> tuple[int, int]:
-        """Return first and one-past-last window of the longest way in so much motion, s."""
+        """Return first and one-past-last window of the furthest travel in `longest` s of motion."""
         kept = np.ones(self.mean.size, dtype=np.bool_)
         for first, last in rests:
             kept[first:last] = False
@@ -198,7 +198,7 @@ class _Windows(NamedTuple):
 def _without(
     record: StampedRecord, rests: Sequence[tuple[float, float]]
 ) -> tuple[StampedRecord, tuple[Pause, ...]]:
-    """Return a record without rests, and where they were."""
+    """Return a record without rests, and the pauses in their places."""
     if not rests:
         return record, ()
     begins, ends = np.array(rests).T

@@ -23,7 +23,7 @@ from valve_friction_ros.identification.units import UNITS
 from valve_friction_ros.model.valve import KarnoppParameters, Valve
 
 SETTLED_SHARE = 0.1
-"""Largest difference of σ_s in the chosen region, over σ_s at the chosen threshold. Chosen."""
+"""Largest difference of σ_s in the chosen region, as a share of σ_s at the threshold. Chosen."""
 
 _THRESHOLD = "threshold δv [m/s]"
 

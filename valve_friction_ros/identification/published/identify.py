@@ -46,7 +46,7 @@ Chosen: double precision rounds forces at 1e-16, and the sweep adds up some 10,0
 def choose_threshold(sweep: Sweep, window: int) -> int:
     """Choose the step of the sweep whose estimates are determined best.
 
-    The published rule takes the region of smallest σ_s. Taken by the letter it fails: far up the
+    The published rule takes the region of smallest σ_s. Taken literally it fails: far up the
     sweep a handful of samples, all of nearly one speed, fits any parameters, and σ_s is smallest
     where it means least. The criterion must be the smallest uncertainty of the *estimates*, not of
     the force. Their covariance is σ_s²·(ΦᵀΦ)⁻¹, and its determinant, the generalised variance,
@@ -99,9 +99,9 @@ _AT_REST_SHARE = 1e-3
 Chosen: above zero by far more than rounding, and below every speed that the sweep uses."""
 
 _FIRST_MARK, _SECOND_MARK = 4.0, 16.0
-"""Displacements, in standard deviations of the rest, whose instants locate the onset of motion.
+"""Displacements, in standard deviations of the rest, whose crossings locate the onset of motion.
 
-The first is above nearly all noise, as `_AT_REST`. The second is four times the first, chosen:
+The first is above nearly all noise, like `_AT_REST`. The second is four times the first, chosen:
 far enough to measure the growth, near enough that the force still grows steadily."""
 
 _ROUNDING = 1e-12
@@ -149,7 +149,7 @@ def find_breakaways(recording: Recording, settings: IdentificationSettings) -> l
     A rest is a stretch of at least two derivative windows without a speed that the noise cannot
     explain. The part of the rest before the next motion gives its position and its noise.
     The instants t₁ and t₂ at which the displacement passes 4 and 16 standard deviations of that
-    noise put the onset at t₁ − (t₂ − t₁)/(4^(1/p) − 1) if it grows with the time to the power p:
+    noise put the onset at t₁ − (t₂ − t₁)/(4^(1/p) − 1) if it grows as time to the power p:
     p = 2 under a growing force, p = 1 after a slip jump, whichever has the smaller residual.
     Without noise the three instants coincide.
 
@@ -163,7 +163,7 @@ def find_breakaways(recording: Recording, settings: IdentificationSettings) -> l
     Returns
     -------
     list of Breakaway
-        In the order of time; indices into the samples of `recording`.
+        In time order; indices into the samples of `recording`.
     """
     window = settings.published_window
     record = measured(recording)
@@ -193,7 +193,7 @@ _MASS_TOLERANCE = 0.25
 """Relative change of a regressed mass with half the derivative window, up to which it is kept.
 
 Chosen from 54 simulated records (3 packings, 3 excitations, 3 levels of noise, with and without
-x̄): masses within 10 % of the truth changed by 5 % at most; wrong masses, but one, by 45 % or
+x̄): masses within 10 % of the truth changed by 5 % at most; wrong masses, except one, by 45 % or
 more."""
 
 
@@ -222,7 +222,7 @@ class PublishedFit(NamedTuple):
 
     @property
     def sliding_friction(self) -> float:
-        """F_c + F_v·|ẋ| at that speed, N: the work of friction over the distance."""
+        """F_c + F_v·|ẋ| at `sliding_speed`, N: the work of friction per distance."""
         estimate = self.estimate
         return estimate.coulomb_friction + estimate.viscous_friction * self.sliding_speed
 
@@ -303,7 +303,7 @@ def published_estimate(
     valve : Valve
         Diaphragm area and pressure reference.
     settings : IdentificationSettings, optional
-        The paper's by default, with the preload as a regressor of its own.
+        The paper's by default, with the preload as a separate regressor.
 
     Returns
     -------

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Method "published": the paper's model 1 as it is, without intervals."""
+"""Method "published": the paper's model 1 unchanged, without intervals."""
 
 import math
 from collections.abc import Container, Mapping
@@ -29,9 +29,9 @@ from valve_friction_ros.signals import MeasuredRecord, measured
 def published_beside(
     record: MeasuredRecord, valve: Valve, settings: IdentificationSettings
 ) -> tuple[Estimate | None, list[str]]:
-    """Run the published method beside another one, which has checked the record.
+    """Run the published method alongside another method, which has checked the record.
 
-    Its refusal becomes a warning.
+    A refusal becomes a warning.
     """
     try:
         require_unbroken(record)

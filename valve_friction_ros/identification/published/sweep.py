@@ -110,7 +110,7 @@ def force_balance_regression(
 
 
 _ROWS_AT_ONCE = 256
-"""Rows that are reflected in at once; with six columns they take 12 kB of a 32 kB cache."""
+"""Rows reflected into the factor at once; with six columns they take 12 kB of a 32 kB cache."""
 
 
 @compiled_reductions
@@ -123,7 +123,7 @@ def factors_above(
     """Factorise ``[Φ_s F_s]``, the samples faster than each threshold.
 
     From the highest threshold down each step only adds the rows between two thresholds, which
-    Householder reflections take into the triangular factor that there is: ``[R; rows] = Q R'``.
+    Householder reflections merge into the current triangular factor: ``[R; rows] = Q R'``.
     Every row is visited once, and, unlike in sums of products, the condition of the columns is
     not squared. Columns may be of any size, since reflections do not mix them.
 
@@ -134,7 +134,7 @@ def factors_above(
     force : ndarray of float, shape (n,)
         Force F, the last column.
     speed : ndarray of float, shape (n,)
-        Speed that decides.
+        Speed that selects the rows.
     thresholds : ndarray of float, shape (S,)
         Thresholds, increasing.
 

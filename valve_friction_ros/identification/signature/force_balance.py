@@ -67,7 +67,7 @@ METHOD = "signature"
 """Name of this method."""
 
 _FEWEST_EACH_WAY = 2
-"""Strokes each way: fewer leave no scatter within a direction, so no standard error."""
+"""Least strokes each way: fewer leave no scatter within a direction, so no standard error."""
 
 _SURE = 4.0
 _LEAST_SLIP = 0.03
@@ -104,12 +104,12 @@ def identify_signature(
     ----------
     recording : Recording
         A valve signature, two strokes or more each way from rest at a constant speed
-        (`TriangleWave` with its 60 s suits the bench valve).
+        (`TriangleWave` with its period of 60 s suits the bench valve).
     valve : Valve
         Geometry.
     settings : IdentificationSettings, optional
         Fixed parameters, position bias, assumed mass and derivative window (of the velocity; by
-        default the noise chooses it). The settings of the sweep do not matter here.
+        default the noise chooses it). The settings of the sweep do not apply.
 
     Returns
     -------

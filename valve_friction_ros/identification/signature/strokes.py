@@ -36,10 +36,10 @@ fit without a jump. Chosen: the best of all starts is kept."""
 
 
 class Onset(NamedTuple):
-    """When a stem leaves its rest, s on the axis of the samples, and the position of the rest, m.
+    """Time at which a stem leaves its rest, s on the axis of the samples, and its position then, m.
 
-    `jump_speed`, m/s, is the speed in the way of motion at which the stem leaves: above zero after
-    a slip jump that shows.
+    `jump_speed`, m/s, is the speed in the direction of motion at which the stem leaves: above zero
+    after a visible slip jump.
     """
 
     time: float
@@ -177,11 +177,13 @@ _REST_SHARE = 0.1
 Chosen: a triangle has the usual speed and zero only, so any pair well apart separates them."""
 
 _LEAST_SPEED_SHARE = 0.1
-"""Speed over the top speed from which a sample counts for the usual speed. Chosen: leaves rests
-out."""
+"""Least speed, as a share of the top speed, of a sample in the usual speed. Chosen: it leaves out
+rests."""
 
 _LEAST_STROKE_SHARE = 0.1
-"""Way of a stroke over the stem's range. Chosen: shorter runs are slips or disturbances."""
+"""Least length of a stroke, as a share of the stem's range.
+
+Chosen: shorter runs are slips or disturbances."""
 
 _STEADY = 0.05
 """The stem slides steadily while its velocity is within this share of the stroke's median.
@@ -194,7 +196,7 @@ _VELOCITY_NOISE = 0.015
 Chosen: see `_STEADY`."""
 
 _ONSET_SHARE = 0.05
-"""Share of a stroke's way that is fitted to locate the onset.
+"""Share of a stroke's length that is fitted to locate the onset.
 
 Chosen: several time constants of the bench's stem; further on the rate of force may change."""
 
@@ -212,7 +214,7 @@ class BreakawayPoint(NamedTuple):
 
     Time since the first sample, s; stem position of the rest, m; drive (pressure, Pa, or force, N)
     and actuator force F_ext, N, at that instant; and the speed at which the stem leaves, m/s: above
-    zero after a slip jump that shows.
+    zero after a visible slip jump.
     """
 
     time: float
@@ -241,7 +243,7 @@ class SignatureStroke:
     """One stroke of the stem: its direction, +1 up or −1 down, and its instants at constant speed.
 
     `breakaway` is None without a recorded rest before it; `steadiness` is the share of the stroke's
-    way at constant speed.
+    length at constant speed.
     """
 
     direction: int
@@ -251,9 +253,9 @@ class SignatureStroke:
 
     @property
     def spring_constant(self) -> float:
-        """Mean of (15) over the way that the stem slides, N/m.
+        """Mean of (15) over the distance that the stem slides, N/m.
 
-        The mean over the way, Σ dF_ext / Σ dx, equals the mean over the instants at a constant
+        The mean over the distance, Σ dF_ext / Σ dx, equals the mean over the instants at a constant
         speed, and noise of the speed does not bias it.
         """
         return float(np.sum(self.sliding.force_rate) / np.sum(self.sliding.velocity))
@@ -282,7 +284,7 @@ def find_strokes(recording: Recording, valve: Valve, window: int) -> tuple[Signa
 
     A stroke is a run at more than half the usual speed over at least a tenth of the stem's range.
     The breakaway is located by `fit_onset`, from the rest before the stroke and the first 5 % of
-    its way; a parabola through as many samples gives the drive there.
+    its length; a parabola through as many samples gives the drive there.
 
     Parameters
     ----------
@@ -296,7 +298,7 @@ def find_strokes(recording: Recording, valve: Valve, window: int) -> tuple[Signa
     Returns
     -------
     tuple of SignatureStroke
-        In the order of time.
+        In time order.
     """
     position, period = recording.position, recording.sample_period
     force = valve.actuator_force(recording.drive)
@@ -352,7 +354,7 @@ def _steady_instants(run: NDArray[np.float64]) -> NDArray[np.intp]:
 def _breakaway(
     recording: Recording, valve: Valve, places: tuple[int, int, int], window: int
 ) -> BreakawayPoint | None:
-    """Locate the onset of a stroke from where its velocity rests, begins and ends.
+    """Locate the onset of a stroke from the samples at which rest and stroke begin and it ends.
 
     A derivative window shows a jump half its length too early, so the fit is half a window longer.
     """

@@ -37,7 +37,7 @@ TRIANGLE_NEEDED = (
 """The remedy in refusals: the excitation that gives a valve signature."""
 
 _LEAST_STEADINESS = 0.6
-"""Median share of a stroke at constant speed.
+"""Least median share of a stroke at constant speed.
 
 0.89 and more in 32 simulated triangles; a square wave behind a lag has no constant speed. Chosen
 between them."""
@@ -53,7 +53,7 @@ class ValveSignature:
     Attributes
     ----------
     strokes : tuple of SignatureStroke
-        In the order of time, each with its breakaway point and its sliding instants.
+        In time order, each with its breakaway point and its sliding instants.
     spring_constant : float
         k, N/m: mean of (15) over the sliding instants of each stroke, and over the strokes.
     position_bias : float
@@ -62,7 +62,7 @@ class ValveSignature:
         Width of the loop, Pa or N: the difference of the drives at which the stem slides up and
         down through one position, 2·(F_c + F_v·|ẋ|)/S_a.
     dead_zone_share : float
-        The same as a share of the pressure's span in the record.
+        `dead_zone` as a share of the pressure's span in the record.
     standard_errors : mapping of str to float
         Of `spring_constant`, `position_bias` and `dead_zone`, from the scatter between strokes;
         nan with a single stroke either way.
@@ -162,7 +162,7 @@ def mean_position_bias(ways: Ways, spring_constant: float) -> float:
 
 
 def sliding_friction(ways: Ways, spring_constant: float) -> float:
-    """Return half the distance of F_ext − k·x between strokes up and down, N: F_c + F_v·|ẋ|."""
+    """Return half the difference of F_ext − k·x between strokes up and down, N: F_c + F_v·|ẋ|."""
     upward, downward = (
         float(
             np.mean(
@@ -178,7 +178,7 @@ def sliding_friction(ways: Ways, spring_constant: float) -> float:
 
 
 def sliding_places(ways: Ways) -> float:
-    """Return how far the stem slides further out on its way up than on its way down, m."""
+    """Return the mean position while sliding up minus that while sliding down, m."""
     upward, downward = (
         float(np.mean([np.mean(stroke.sliding.position) for stroke in way])) for way in ways
     )
@@ -192,7 +192,7 @@ def sliding_speed(ways: Ways) -> float:
 
 
 def leaving_speed(ways: Ways) -> float:
-    """Return the mean speed at which the stem breaks away, m/s; 0 where any stroke shows none."""
+    """Return the mean speed at which the stem breaks away, m/s; 0 if any stroke shows no jump."""
     speeds = [point.speed for way in ways for point in breakaway_points(way)]
     return float(np.mean(speeds)) if min(speeds) > 0 else 0.0
 
@@ -203,13 +203,13 @@ def valve_signature(
     """Read spring constant, bias and dead zone off a valve signature.
 
     The breakaway points, which the paper reads off its Fig. 2 by eye, are found by `fit_onset`.
-    A stroke from a travel stop counts too: as the stem leaves, the stop carries no force.
+    A stroke from a travel stop is included too: as the stem leaves, the stop carries no force.
 
     Parameters
     ----------
     recording : Recording
         Strokes in both directions at a constant speed, each from a rest, as a triangular pressure
-        makes them: `TriangleWave` with its 60 s suits the bench valve.
+        gives: `TriangleWave` with its period of 60 s suits the bench valve.
     valve : Valve
         Diaphragm area and pressure reference.
     window : int, optional

@@ -38,8 +38,9 @@ _GATE = 6.0
 """Standard deviations of the noise beyond which a sample has left its level: 2 of 10⁹ by chance."""
 
 _LEAST_SHARE = 1e-6
-"""Noise of a noiseless signal, as a share of its range. Chosen: above rounding, below every
-step."""
+"""Noise assumed for a noiseless signal, as a share of its range.
+
+Chosen: above rounding, below every step."""
 
 _LEVEL_SAMPLES = 10
 """Samples of a level. Chosen: their mean has a third of the noise of one sample."""
@@ -55,8 +56,7 @@ _CORNER_SAMPLES = 40
 """Samples on either side of a corner over which slopes are compared (`find_corners`).
 
 Chosen: 40 ms at 1 kHz, as for a pressure, short against the lag of a converter. A number of
-samples,
-because the function knows no time: at 10 Hz it is 4 s."""
+samples, because the function does not know the sample period: at 10 Hz it is 4 s."""
 
 
 def find_steps(signal: NDArray[np.float64]) -> list[int]:
@@ -70,7 +70,7 @@ def find_steps(signal: NDArray[np.float64]) -> list[int]:
     Parameters
     ----------
     signal : ndarray of float, shape (n,)
-        Input signal, at least ten samples a level.
+        Input signal, at least ten samples per level.
 
     Returns
     -------
@@ -208,7 +208,7 @@ class StepTest:
     Attributes
     ----------
     steps : tuple of StepMetrics
-        In the order of time.
+        In time order.
     dead_band : Bracket
         Range of the input, after a reversal, without a movement. Lower bound: the largest range
         that the input swept while the stem rested. Upper bound: the smallest change that moved
@@ -227,7 +227,7 @@ class StepTest:
     smallest_movement: float
 
     def __str__(self) -> str:
-        """Return dead band and resolution, and the response to each step, a line each."""
+        """Return dead band and resolution, and the response to each step, one line each."""
         brackets = (
             f"{name} between {bracket.ignored:.4g} and {bracket.answered:.4g}"
             for name, bracket in (("dead band", self.dead_band), ("resolution", self.resolution))
@@ -318,7 +318,7 @@ def step_test(
 def _rows(
     input_signal: ArrayLike, position: ArrayLike
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return both signals as rows of equal length; raises ValueError where they are none."""
+    """Return both signals as rows of equal length; raises ValueError if they are not."""
     signal = np.asarray(input_signal, dtype=np.float64)
     measured = np.asarray(position, dtype=np.float64)
     if signal.ndim != 1 or signal.shape != measured.shape or signal.size == 0:

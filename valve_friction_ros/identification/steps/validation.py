@@ -118,8 +118,10 @@ def identified_model(
 
 
 _START_TIME = 0.1
-"""Longest part of the record, s, that gives the start. Chosen: the speed changes little within it;
-an absolute time, half the time constant F_v/k of the tight bench packing."""
+"""Longest part of the record, s, that gives the initial state.
+
+Chosen: the speed changes little within it; an absolute time, half the time constant F_v/k of the
+tight bench packing."""
 
 _START_ORDER = 3
 """Polynomial order whose fitting window gives the length of that part: the paper's n."""
@@ -139,7 +141,7 @@ class Validation:
     simulated : ndarray of float, shape (n,)
         Simulated stem position at the same times, m.
     notes : tuple of str
-        What replaces the numbers that the model lacks, one sentence each.
+        Substitutes for values that the model lacks, one sentence each.
     """
 
     recording: Recording
@@ -147,7 +149,7 @@ class Validation:
     notes: tuple[str, ...] = ()
 
     def __str__(self) -> str:
-        """Return fit and errors on one line, and each note on a line of its own."""
+        """Return fit and errors on one line, and each note on its own line."""
         figures = (
             f"fit {100 * self.fit:.2f} %, rms {self.rms * 1e6:.3g} µm, "
             f"largest error {self.maximum_error * 1e6:.3g} µm"
@@ -216,11 +218,11 @@ def validate(
     Parameters
     ----------
     recording : Recording
-        Pressure and stem position; another record than the one identified, to validate.
+        Pressure and stem position; to validate, not the record that was identified.
     valve : Valve
         Geometry.
     parameters : KarnoppParameters or Result
-        The model; of a result, its identified values (`identified_model`).
+        The model, or a result with its identified values (`identified_model`).
 
     Returns
     -------

@@ -32,8 +32,8 @@ _LEAST_WINDOWS = 10
 
 _SHORTEST_PERIOD = 1e-6
 _LONGEST_PERIOD = 3600.0
-"""Sample periods, s. Chosen: a hundred times beyond recorders of valves either way; with stranger
-ones the simulation would divide by zero, or take a million steps a sample."""
+"""Sample periods, s. Chosen: a hundred times beyond recorders of valves either way; further out the
+simulation would divide by zero, or take a million steps per sample."""
 
 _MOTION_OVER_NOISE = 10.0
 """Range of the position over its white noise.
@@ -42,12 +42,13 @@ White noise alone spans 9 standard deviations in 60,000 samples; simulated recor
 more."""
 
 _LEAST_SHARE_OF_DIRECTION = 0.02
-"""Way in the rarer direction over the whole way.
+"""Least distance in the rarer direction, as a share of the whole distance.
 
-Zero for one direction; 0.41 and more in simulated records. Chosen: one short stroke back counts."""
+Zero for one direction; 0.41 and more in simulated records. Chosen: one short stroke back is
+enough."""
 
 _ELASTIC = 3e-3
-"""Way over the travel that a stem may go elastically, before its packing slides.
+"""Distance that a stem may move elastically before its packing slides, as a share of the travel.
 
 Chosen: packings give by some 50 µm; 60 µm are 0.3 % of a small travel."""
 
@@ -72,7 +73,7 @@ _SURELY_FOLLOWED = 0.5
 inverted record; a small share has a slope by chance."""
 
 _FOLLOWED_BLOCK = 0.1
-"""Time, s, over which pressure and position are averaged before that test.
+"""Time, s, over which pressure and position are averaged before the test of `_LEAST_FOLLOWED`.
 
 Chosen: 100 samples at 1 kHz average noise. It is absolute, a tenth of the bench's lag; a share of
 the time of a stroke would suit other valves."""
@@ -81,8 +82,8 @@ _FEWEST_BLOCKS = 20
 """Fewest of these blocks. Chosen: a fit of three numbers; a short record has shorter ones."""
 
 _MOVING_SHARE = 0.05
-"""Speed over the top speed from which the stem counts as moving in that test. Chosen: leaves the
-rests out, where pressure changes within the dead band."""
+"""Speed, as a share of the top speed, above which the stem is moving in that test. Chosen: it
+leaves out rests, where pressure changes within the dead band."""
 
 _LEAST_SAMPLES_A_STROKE = 10
 """Samples that the whole range takes at the top speed; 11 and more in simulated records.
@@ -91,12 +92,12 @@ Chosen: with fewer a stroke has no resting and sliding part, or the sample is a 
 
 
 def require_drive(recording: Recording, valve: Valve) -> None:
-    """Refuse a force on the diaphragm of a valve, and a pressure without a diaphragm.
+    """Refuse a recorded force for a valve with a diaphragm, or a pressure for a valve without one.
 
     Raises
     ------
     ValueError
-        With the remedy.
+        The message gives the remedy.
     """
     if recording.driven_by is not valve.driven_by:
         raise ValueError(
@@ -142,7 +143,7 @@ def require_motion(recording: Recording) -> None:
 
 
 def _distances(position: NDArray[np.float64], deadband: float) -> tuple[float, float]:
-    """Return the distances moved up and down, without turns smaller than `deadband`."""
+    """Return the distances moved up and down, ignoring turns smaller than `deadband`."""
     up = down = 0.0
     highest = lowest = turn = float(position[0])
     direction = 0
@@ -164,9 +165,9 @@ def _distances(position: NDArray[np.float64], deadband: float) -> tuple[float, f
 def require_two_directions(recording: Recording, window: int, travel: float = math.inf) -> None:
     """Refuse a stem that moves in one direction only, or hardly in the other.
 
-    The position is averaged over `window` samples first; turns within its noise do not count. Nor
-    does a way that a packing may give elastically before it slides, by the `travel` of the valve,
-    m.
+    The position is averaged over `window` samples first. Turns within its noise are ignored, and so
+    is a distance that a packing may yield elastically before it slides, a share of the `travel` of
+    the valve, m.
     """
     require_enough_samples(recording, window)
     means = len(recording) // window
@@ -210,10 +211,10 @@ def require_travel(recording: Recording, valve: Valve) -> None:
 
 
 class _Followed(NamedTuple):
-    """How the drive of the moving stem follows it.
+    """How the drive follows the moving stem.
 
     The slope of drive over position, Pa/m or N/m; the share of the drive's variance that position
-    and direction explain; and whether the drive does work on the stem, as friction takes it.
+    and direction explain; and whether the drive does work on the stem, which friction dissipates.
     """
 
     slope: float
@@ -246,7 +247,7 @@ def _followed(recording: Recording) -> _Followed:
     share = 1 - float(left @ left) / total if total > 0 else 0.0
     away = columns[:, 0]
     along = float(away @ target) / max(float(away @ away), np.finfo(float).tiny)
-    # Of the samples, not of the blocks: those of a stem that swings fast lose its phase.
+    # From the samples, not the blocks: blocks lose the phase of a stem that swings fast.
     between = [0.5 * (one[1:] + one[:-1]) for one in (recording.position, recording.drive)]
     off_line = between[1] - target.mean() - along * (between[0] - place.mean())
     work = float(off_line @ np.diff(recording.position))
@@ -254,7 +255,7 @@ def _followed(recording: Recording) -> _Followed:
 
 
 _JUMPED = 0.5
-"""Share of the distance that may lie between two samples, in jumps of a stem that sticks."""
+"""Share of the distance that a sticking stem may cover in jumps between two samples."""
 
 
 def require_changing_drive(recording: Recording) -> None:

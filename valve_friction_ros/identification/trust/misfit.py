@@ -22,8 +22,7 @@ LEAST_FIT = 0.9
 """Share of the movement below which a model that does not describe the record is refused.
 
 Chosen below all simulated records, which have 0.96 and more, except in-service records of graphite
-at 100 Hz
-(0.84)."""
+at 100 Hz (0.84)."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +56,7 @@ class Misfit:
 
     @property
     def words(self) -> str:
-        """The systematic misfit with its unit, for people."""
+        """The systematic misfit with its unit, as text."""
         return misfit_words(self.systematic, self.unit)
 
     @property

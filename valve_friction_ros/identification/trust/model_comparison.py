@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Which of two models of one record is more probable."""
+"""Comparison of two models of one record: which is more probable."""
 
 import math
 from dataclasses import dataclass
@@ -29,7 +29,7 @@ class Support(Enum):
 
     @classmethod
     def of(cls, log_ratio: float) -> "Support":
-        """Return the highest whose evidence ratio, the value, is reached in either direction."""
+        """Return the strongest support whose ratio, its value, is reached in either direction."""
         return max(
             (one for one in cls if abs(log_ratio) >= math.log(one.value)), key=lambda one: one.value
         )
@@ -44,20 +44,21 @@ class ModelComparison:
     log_ratio : float
         Natural logarithm of the evidence for the first over that for the second.
     rms : tuple of float
-        Root mean square of what each leaves of the stem, m.
+        Root mean square residual of the stem under each model, m.
     free : tuple of int
         Free parameters of each.
     samples, independent : float
-        Samples of the stem, and as how many independent ones they count.
+        Samples of the stem, and the equivalent number of independent samples.
     describes : tuple of bool
-        Whether what each leaves is no more than noise.
+        Whether the residual of each model is no more than noise.
 
     Notes
     -----
     The evidence is Schwarz's: −n/2·ln(mean square) − p/2·ln n, with n independent samples and p
-    free parameters. What a model leaves is autocorrelated, so n is the number of samples over the
-    sum of its autocorrelation at all lags, of the model with fewer. That is rough: the two stems
-    differ in few places, and the ratio of two wrong models says which is nearer, not which is true.
+    free parameters. The residual of a model is autocorrelated, so n is the number of samples over
+    the sum of its autocorrelation at all lags, for the model with the smaller n. That is rough: the
+    two stems differ in few places, and the ratio of two wrong models says which is nearer, not
+    which is true.
     """
 
     log_ratio: float
@@ -69,18 +70,18 @@ class ModelComparison:
 
     @property
     def support(self) -> Support:
-        """How strongly the record speaks."""
+        """How strongly the record favours one of the models."""
         return Support.of(self.log_ratio)
 
     def __str__(self) -> str:
-        """Return it in words."""
+        """Return the comparison in words."""
         return evidence_ratio_words(
             self.support.name, self.log_ratio, self.samples, self.independent, self.describes
         )
 
 
 def independent_samples(residual: NDArray[np.float64]) -> float:
-    """Return as how many independent samples an autocorrelated residual counts.
+    """Return the number of independent samples that an autocorrelated residual is worth.
 
     The autocorrelation is summed up to the lag at which a pair of neighbours is negative (Geyer's
     initial positive sequence).
@@ -103,7 +104,7 @@ def models_compared(
     free: tuple[int, int],
     describes: tuple[bool, bool] = (True, True),
 ) -> ModelComparison:
-    """Compare what two models leave of the same samples of the stem.
+    """Compare two models by their residuals on the same samples of the stem.
 
     Parameters
     ----------
@@ -112,7 +113,7 @@ def models_compared(
     free : tuple of int
         Free parameters of each.
     describes : tuple of bool
-        Whether each leaves no more than noise.
+        Whether each residual is no more than noise.
 
     Examples
     --------

@@ -45,10 +45,10 @@ _PRESSURE = _Quantity(
     {"bar": 1e5, "kPa": 1e3, "psi": 6894.76, "mbar": 100.0, "MPa": 1e6},
 )
 """Highest pressure of a record. A spring range starts at 0.2 bar (3 psi), seldom at half of that,
-and a stem moves only beyond; the supply is at most 10 bar, absolute or with margin 16."""
+and a stem moves only above it; the supply is at most 10 bar, absolute or with margin 16."""
 
 _REFERENCE = _Quantity("Pa", (2e3, 1.6e6), (3e4, 1.2e5), _PRESSURE.units)
-"""Pressure reference other than 0: that of the air for an absolute sensor, as a rule."""
+"""Pressure reference other than 0: as a rule the air pressure, for an absolute sensor."""
 
 _AREA = _Quantity("m²", (1e-3, 1.0), (3e-3, 0.6), {"cm²": 1e-4, "in²": 6.4516e-4, "mm²": 1e-6})
 _TRAVEL = _Quantity("m", (2e-3, 0.7), (4e-3, 0.2), {"mm": 1e-3, "cm": 1e-2, "in": 0.0254})
@@ -64,41 +64,41 @@ _TRIP_SPEED = 5.0
 """Speed, m/s, that even a spring that slams a valve shut does not reach."""
 
 _TIME_CONSTANT = _Quantity("s", (0.0, 10.0), (1e-3, 2.0), {"ms": 1e-3, "µs": 1e-6, "ns": 1e-9})
-"""F_v/k, in which a stem follows a step of pressure: 0.02 to 0.4 s for the paper's packings."""
+"""F_v/k, with which a stem follows a step of pressure: 0.02 to 0.4 s for the paper's packings."""
 
 _ORDER, _WINDOW = 3, 11
 """Order of the derivatives, and their window where the unit of time itself is in doubt, samples."""
 
 _MOVING_SHARE, _MOVING_NOISE = 0.05, 4.0
-"""Speed from which the stem is moving: over the top speed, chosen as in the other checks of a
-record; and over the deviation of the noise in the speed, which in a record of slow moves would pass
-for viscous friction."""
+"""Speed above which the stem is moving: as a share of the top speed, chosen as in the other checks
+of a record; and in standard deviations of the velocity noise, which in a record of slow moves would
+pass for viscous friction."""
 
 _MOST_BLOCKS = 200
-"""Most blocks for a scatter. Chosen: noise makes any number of strokes, and memory is finite."""
+"""Most blocks for a scatter. Chosen: noise can feign any number of strokes; memory is finite."""
 
 _OUTSIDE = 0.05
-"""Distance beyond the travel, over the travel, up to which a record is judged; `require_travel`
-refuses a longer one, as where the signals are swapped."""
+"""Distance beyond the travel, as a share of it, up to which a record is judged; `require_travel`
+refuses a larger distance, such as that of swapped signals."""
 
 _LEAST_SAMPLES = 100
 """Samples below which the time is not judged. Chosen: other checks refuse such a record."""
 
 _PERCENT = (20.0, 105.0)
-"""Highest value of a signal in percent. Chosen: lower ones have an ordinary unit too."""
+"""Highest value of a signal in percent. Chosen: lower values have an ordinary unit too."""
 
 
 def require_plausible_units(
     recording: Recording, valve: Valve, settings: IdentificationSettings
 ) -> None:
-    """Refuse a record or a valve in which a quantity is beyond every control valve.
+    """Refuse a record or a valve with a quantity that no control valve has.
 
-    A machine without a spring, one with a force as its drive, and a dead sensor are not judged.
+    A machine without a spring, a machine driven by a force, and a dead sensor are not judged.
 
     Raises
     ------
     RefusalError
-        With the quantity, and the unit in which it would be ordinary.
+        The message names the quantity, and the unit in which it would be ordinary.
     """
     if (
         not _is_valve(recording, valve)
@@ -137,7 +137,7 @@ def require_valve_units(valve: Valve, known: Mapping[str, float]) -> None:
     Raises
     ------
     ValueError
-        With the quantity, and the unit in which it would be ordinary.
+        The message names the quantity, and the unit in which it would be ordinary.
     """
     judged = [("diaphragm_area is", valve.diaphragm_area, _AREA)]
     if np.isfinite(valve.travel):

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The mean friction of the sliding stem: the work of friction over the distance."""
+"""The mean friction of the sliding stem: the work of friction per distance."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,17 +15,17 @@ from numpy.typing import NDArray
 from valve_friction_ros.model.valve import KarnoppParameters
 
 COMPARABLE = "comparable"
-"""Name of the evidence by which the sliding frictions of two records are compared.
+"""Name of the evidence that compares the sliding frictions of two records.
 
-``shared_half_width``, N, is the part of its half width by which another record of the same sensors
-is wrong alike; ``speed_exponent`` is d ln F / d ln v at the sliding speed, and ``half_width`` that
-of the exponent but for what is shared."""
+``shared_half_width``, N, is the part of the half width that another record of the same sensors has
+in common; ``speed_exponent`` is d ln F / d ln v at the sliding speed, and ``half_width`` is the
+half width of the exponent without the common part."""
 
 SPEED_EXPONENT = "speed_exponent"
-"""Name of d ln F / d ln v at the sliding speed: near it, friction grows as that power of speed."""
+"""Name of d ln F / d ln v at the sliding speed: friction near it grows as this power of speed."""
 
 FINEST_SLIDING = 3e-3
-"""Least half width of its interval, as a share of the value, however quiet the record is.
+"""Least half width of a sliding friction, as a share of its value, however quiet the record is.
 
 The speed of the stem, and so the mean friction, is known no better than the step of the simulation
 allows."""

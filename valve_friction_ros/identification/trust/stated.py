@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""What a data sheet states of a valve, compared with what a record shows."""
+"""Comparison of the data sheet of a valve with a record."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -24,14 +24,16 @@ from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
 
 CONTRADICTED = "contradicted_data"
-"""Name of the evidence that holds the contradictions by the name of the parameter."""
+"""Name of the evidence that holds the contradictions by parameter name."""
 
 _NARROW = 0.1
 """Half width, as a share of the value, up to which a number is compared."""
 
 _WIDTHS = 2.0
 _DIFFERENT = 0.15
-"""Half widths, and share of the stated value, beyond both of which two numbers contradict.
+"""Difference, in half widths and as a share of the stated value, beyond which numbers contradict.
+
+Both must be exceeded.
 
 Chosen: springs of a catalogue are made to ±10 %."""
 
@@ -53,7 +55,7 @@ _SLIPS: Mapping[float, tuple[str, str]] = MappingProxyType(
         1e4: ("another unit", "another unit"),
     }
 )
-"""Factors by which an area, or a pressure, is typed wrong: how it becomes too large, too small."""
+"""Factors of common entry errors in an area or a pressure: why it is too large, too small."""
 
 
 class Cause(Enum):
@@ -105,7 +107,7 @@ def _compared(one: Parameter | None, size: float) -> Parameter | None:
 
 
 def _slip(factor: float) -> str:
-    """Return how an area or a pressure comes out wrong by a factor; empty where nothing fits."""
+    """Return the entry error that makes an area or a pressure wrong by a factor; empty if none."""
     size = max(factor, 1 / factor)
     nearest = min(_SLIPS, key=lambda slip: abs(math.log(size / slip)))
     return _SLIPS[nearest][factor < 1] if abs(size / nearest - 1) < _DIFFERENT else ""
@@ -126,10 +128,10 @@ def _of_scale(
 def contradictions(
     parameters: Mapping[str, Parameter], stated: Mapping[str, float], valve: Valve, span: float
 ) -> tuple[Contradiction, ...]:
-    """Compare stated numbers with those found, where the latter are narrow.
+    """Compare stated numbers with identified numbers that have a narrow interval.
 
-    A spring constant grows with the area, and with the scale of the pressure, and so does a
-    preload. A wrong zero of the pressure adds a constant to the preload alone.
+    Spring constant and preload grow with the area and with the scale of the pressure. A wrong zero
+    of the pressure adds a constant to the preload alone.
 
     Parameters
     ----------
@@ -145,7 +147,7 @@ def contradictions(
     Returns
     -------
     tuple of Contradiction
-        None where all agrees, or the record knows no better.
+        Empty where all agree, or the record is not precise enough.
     """
     told = []
     spring, factor = _of_scale(parameters, stated, "spring_constant")
@@ -180,7 +182,7 @@ def _of_factor(
 
 
 def _of_preload(one: Parameter, stated: float, scale: float, valve: Valve) -> Contradiction:
-    """Tell one atmosphere from another preload; `scale` is that of all forces."""
+    """Distinguish an offset of one atmosphere from another preload; `scale` is of all forces."""
     if valve.diaphragm_area is None:
         return Contradiction(one.name, stated, one.value, Cause.OTHER_PRELOAD)
     pressure = (one.value - scale * stated) / valve.diaphragm_area
@@ -216,9 +218,9 @@ def _of_assumed(
     assumed: Sequence[str],
     valve: Valve,
 ) -> tuple[dict[str, str], list[str]]:
-    """Return why numbers of assumed data are doubtful, and one sentence on what was not stated.
+    """Return why numbers from assumed data are doubtful, and one sentence on the assumed data.
 
-    A stated spring constant that the record confirms makes up for an area.
+    A stated spring constant that the record confirms makes up for an assumed area.
     """
     if not assumed:
         return {}, []
@@ -246,12 +248,12 @@ def with_stated(
     valve: Valve,
     recording: Recording,
 ) -> tuple[dict[str, Parameter], dict[str, Contradiction], tuple[str, ...]]:
-    """Return parameters with the doubt of their data, the contradictions, and all that in words.
+    """Return parameters with doubtful data marked, the contradictions, and sentences on both.
 
-    What depends on `assumed` data of the valve is weak at most, and so is a contradicted number.
-    Where the scale of the forces is in doubt, all numbers that grow with it are: the spring
-    constant is contradicted, or a preload that no spring constant confirms. The ratio to a baseline
-    of the same scale stays as it is.
+    A number that depends on `assumed` data of the valve, or contradicts a stated number, is weak at
+    most. Where the spring constant is contradicted, or a preload that no spring constant confirms,
+    the scale of the forces is in doubt, and so are all numbers that grow with it. The ratio to a
+    baseline of the same scale is unaffected.
     """
     span = valve.travel if math.isfinite(valve.travel) else float(np.ptp(recording.position))
     told = {one.name: one for one in contradictions(parameters, stated, valve, span)}
@@ -269,7 +271,7 @@ def with_stated(
 
 
 def _sentence(one: Contradiction, valve: Valve) -> str:
-    """Say what contradicts what, and what to check."""
+    """Describe the contradiction and what to check."""
     unit = PARAMETER_UNITS[one.name]
     return (
         f"{one.name} is {one.found:.6g} {unit} from the record but stated as {one.stated:.6g} "

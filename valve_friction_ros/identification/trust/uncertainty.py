@@ -124,7 +124,7 @@ def jackknife(
     Parameters
     ----------
     groups : sequence of sequences
-        Independent members of each kind, at least one a group.
+        Independent members of each kind, at least one per group.
     statistic : callable
         From groups to named values.
 
@@ -157,7 +157,7 @@ def jackknife(
 
 
 CORRELATION = "correlation"
-"""Name of the evidence that holds it."""
+"""Name of the evidence that holds the correlation of the parameters."""
 
 
 class Correlation(TypedDict):
@@ -181,11 +181,11 @@ def correlation_of(
     covariance : ndarray of float, shape (p, p)
         Covariance of the coordinates.
     own : mapping of str to float, optional
-        Variance of a number that no other shares.
+        Variance of a number that it shares with no other number.
 
     Examples
     --------
-    The sum of two independent numbers of variance 1 and 3 goes with the first by 1/2.
+    The sum of two independent numbers of variance 1 and 3 has a correlation of 1/2 with the first.
 
     >>> import numpy as np
     >>> gradients = {"one": np.array([1.0, 0.0]), "sum": np.array([1.0, 1.0])}
@@ -299,7 +299,7 @@ def block_covariance(
     residual : ndarray of float, shape (n,)
         Model minus measurement, at the estimate.
     block : int
-        Samples a block; shortened where fewer than 8 blocks would remain.
+        Samples per block; shortened where fewer than 8 blocks would remain.
 
     Returns
     -------

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The verdict on an identified number: how far it can be trusted; what area and scales add."""
+"""Verdicts on identified numbers, and the uncertainty that area and sensor scales add to them."""
 
 import math
 from collections.abc import Mapping
@@ -22,8 +22,8 @@ from valve_friction_ros.wording import percentage
 FALL_SPEED = 6.5e-3
 """Speed, m/s, up to which friction may fall: twice the v_s = 3.26 mm/s published for graphite.
 
-At 2·v_s the fall is complete but for e⁻⁴ = 2 %. A slower record does not separate F_c from the
-friction at low speed. An absolute size from one packing, applied to every valve."""
+At 2·v_s the fall is complete except for e⁻⁴ = 2 %. A slower record does not separate F_c from the
+friction at low speed. An absolute value from one packing, applied to every valve."""
 
 NO_SLIP = "the record shows no slip jump: F_s cannot be separated from F_c"
 """Reason of a static friction that is not identifiable."""
@@ -36,10 +36,10 @@ Chosen: a fifth of the 25 % growth of F_c that raises the first alarm (`Friction
 
 
 PRELOAD_SCALE = 0.12
-"""Share of the range of the actuator force below which the size of a preload is that of this share.
+"""Least size by which the interval of a preload is judged, as a share of the actuator force range.
 
 A preload may well be zero, so its interval is judged by what depends on it, the balance of spring
-and actuator: at `WEAK_SHARE` of this it is 0.6 % of the range, a fifth of the shift that is first
+and actuator: `WEAK_SHARE` of this is 0.6 % of the range, a fifth of the smallest shift that is
 found (`ValveLimits.preload_change`)."""
 
 
@@ -76,8 +76,8 @@ class Parameter:
     published : float
         Estimate of the published method, SI unit; nan where that method refused the record.
     uncalibrated : Parameter or None
-        The same before the uncertainty of area and sensor scales widened its interval, and before
-        stated values put the scale in doubt; None where neither did.
+        The parameter before the uncertainty of area and sensor scales widened its interval, and
+        before stated values put the scale in doubt; None where neither happened.
     """
 
     name: str
@@ -98,9 +98,9 @@ class Parameter:
 
     @property
     def without_calibration(self) -> "Parameter":
-        """The parameter as record and timing know it, to be compared with another such one.
+        """The parameter without calibration uncertainty, to compare with one of the same sensors.
 
-        The same area and sensors scale both numbers alike, which cancels in their ratio.
+        Errors of area and sensor scales are common to both and cancel in their ratio.
         """
         return self.uncalibrated or self
 
@@ -122,7 +122,7 @@ def share_of(value: float, half_width: float, scale: float = 0.0) -> float:
 
 
 def interval_share(value: float, share: float, scale: float = 0.0) -> str:
-    """Say what share of its value, or of the scale that counts in its place, an interval is."""
+    """Express an interval in words, as a share of its value or of the scale used in its place."""
     if abs(value) >= scale:
         return f"±{percentage(share)} of its value"
     return f"±{percentage(share * PRELOAD_SCALE)} of the range of the actuator force"
@@ -146,7 +146,7 @@ def with_verdict(
         A reason why the value is at most weak, however narrow its interval is. Without a doubt the
         width of the interval is the reason.
     scale : float
-        Least size, SI unit, that the interval is judged by where the value may be zero.
+        Least size, SI unit, by which the interval is judged where the value may be zero.
 
     Returns
     -------
@@ -187,7 +187,7 @@ _EXPONENTS: Mapping[str, tuple[int, int]] = {
     "stribeck_velocity": (0, 1),
     "limit_velocity": (0, 1),
 }
-"""Powers of the scales of force and length that a parameter grows with; of others none."""
+"""Powers of the force and length scales with which a parameter grows; 0 for all others."""
 
 OF_FORCE = frozenset(name for name, (force, _) in _EXPONENTS.items() if force)
 """Parameters that grow with the scale of the forces."""
@@ -197,11 +197,11 @@ COVERAGE = 2.0
 
 
 def calibration_share(name: str, settings: IdentificationSettings, driven_by: Drive) -> float:
-    """Return the relative standard uncertainty of a parameter by the calibration.
+    """Return the relative standard uncertainty of a parameter due to calibration.
 
     A parameter is a product of powers of the scales, so that their relative uncertainties, each
-    times its power, add in squares (GUM 5.1.6). Area and pressure make the scale of a force; a
-    drive that is a force has that of its sensor alone. A preload by a known bias is k·x̄.
+    times its power, add in squares (GUM 5.1.6). Area and pressure set the scale of a force; a
+    drive that is a force has only the scale of its sensor. A preload from a known bias is k·x̄.
     """
     if name == "spring_preload" and settings.position_bias is not None:
         name = "spring_constant"
@@ -217,9 +217,9 @@ def calibration_share(name: str, settings: IdentificationSettings, driven_by: Dr
 def calibrated(one: Parameter, share: float) -> Parameter:
     """Widen the interval of an estimate by a relative standard uncertainty of its scale.
 
-    Both are independent, and add in squares. The verdict follows from the wider interval; as the
-    record determines the value all the same, it is weak at most. A given value stays, and one
-    without an interval.
+    Both are independent, and add in squares. The verdict follows from the wider interval; since the
+    record still determines the value, the verdict is never worse than weak. A given value, or one
+    without an interval, is returned unchanged.
     """
     error = share * abs(one.value)
     is_estimate = one.half_width >= 0 and one.verdict is not Verdict.FIXED
@@ -250,8 +250,8 @@ def with_calibration(
 ) -> tuple[dict[str, Parameter], dict[str, object]]:
     """Return parameters with the calibration in their intervals, and evidence with its budget.
 
-    A method without a budget of its own gets one where there is a calibration to tell of: the
-    standard error is the share of the record. What has been widened before is not widened again.
+    A method without a budget gets one if there is a calibration uncertainty: the standard error
+    is the share of the record. A parameter that has been widened before is not widened again.
     """
     shares = {name: calibration_share(name, settings, driven_by) for name in parameters}
     found = {name: calibrated(one, shares[name]) for name, one in parameters.items()}
