@@ -183,7 +183,7 @@ def velocity_noise(noise: float, sample_period: float, window: int, order: int) 
 
 
 _stamped_noises: WeakKeyDictionary[StampedSignal, float] = WeakKeyDictionary()
-"""The noise of the signals of an identification, of which several parts ask for it."""
+"""Noise of the signals of an identification, several parts of which need it."""
 
 
 def stamped_noise(signal: StampedSignal) -> float:
@@ -224,7 +224,7 @@ _CORNER_SHARPNESS = 3.0
 zero, on a parabola equal; three separates both in noise."""
 
 _LEAST_DETERMINANT = 1e-9
-"""Determinant of two unit vectors below which they are parallel but for rounding. One sample
+"""Determinant of two unit vectors below which they are parallel up to rounding. One sample
 after a corner gives 1e-15, two give 0.05 and more."""
 
 _CORNER_SCALES = (1, 2, 4)
@@ -380,13 +380,13 @@ def _convolved(signal: NDArray[np.float64], weights: NDArray[np.float64]) -> NDA
     """Convolve a signal with fewer weights, where they overlap in full."""
     if weights.size < _LONG_WINDOW:
         return np.asarray(np.convolve(signal, weights, "valid"), dtype=np.float64)
-    length = 1 << (signal.size - 1).bit_length()  # what goes round is before the full overlap
+    length = 1 << (signal.size - 1).bit_length()  # wrapped products come before the full overlap
     product = np.fft.rfft(signal, length) * np.fft.rfft(weights, length)
     return np.asarray(np.fft.irfft(product, length)[weights.size - 1 : signal.size])
 
 
 def _local_cubics(stretch: NDArray[np.float64], window: int) -> NDArray[np.float64]:
-    """Filter as Savitzky and Golay, the ends by the cubics of the first and the last window.
+    """Apply a Savitzky–Golay filter; the cubics of the first and the last window give the ends.
 
     The result is that of `scipy.signal.savgol_filter` with ``mode="interp"``. That function repeats
     the fit of the cubics for each part, and takes n·window products; the Fourier transform needs
@@ -581,21 +581,21 @@ def all_around(which: NDArray[np.bool_], reach: int) -> NDArray[np.bool_]:
 _FEWEST_CHANGES = 20
 _SHORTER_HOLD = 0.6
 _FEW_SHORTER = 0.02
-"""A signal is held if it changes so often, and at most so many of its runs of equal values are
-shorter than this share of the usual one: noise changes a signal at any time."""
+"""A signal is held if it changes this often, and fewer than the last share of its runs of equal
+values are shorter than the first share of the usual run: noise changes a signal at any time."""
 
 _LARGER_STEP = 1.5
 _MANY_LARGER = 0.2
-"""And if so many of its changes are larger than the least one by this factor: the values of a
-converter that follows a slow stem change by one step each, at any time."""
+"""And if more than this share of its changes are larger than the least change by this factor: the
+values of a converter that follows a slow stem change by one step each, at any time."""
 
 
 def without_repeats(signal: StampedSignal) -> StampedSignal:
     """Keep the fresh values of a held signal, at the stamps at which they first appeared.
 
-    A repeated value says nothing new, and a wrong thing of the time at which it is repeated. A
-    signal that is not held is returned as it is. Where a source sent the same value again, the
-    sample in its place is kept.
+    A repeated value adds nothing, and is wrong at the time at which it is repeated. A signal that
+    is not held is returned unchanged. Where a source sent the same value again, the sample in its
+    place is kept.
     """
     steps = np.diff(signal.value)
     changes = np.flatnonzero(steps) + 1
@@ -622,21 +622,21 @@ def without_repeats(signal: StampedSignal) -> StampedSignal:
 _IRREGULAR_GAP = 3.0
 _REGULAR_SHARE = 0.8
 _EVEN_STEP = 0.5
-"""A signal is sent on change if its longest pause is more than so many usual ones, fewer than that
-share of its pauses are as short as the shortest, and its steps are hardly ever smaller than that
-share of the usual one. Samples that are lost leave the pauses of the others alike; a sensor that
-samples by itself has steps of any size."""
+"""A signal is sent on change if its longest pause is more than so many usual pauses, fewer than
+this share of its pauses are as short as the shortest, and its steps are hardly ever smaller than
+this share of the usual step. Lost samples leave the other pauses alike; a sensor that samples at
+its own rate has steps of any size."""
 
 _JUMP = 2.0
-"""Dead bands beyond which a change after a pause was a jump: slower ones are sent on the way."""
+"""Dead bands beyond which a change after a pause was a jump: a slower change is sent on its way."""
 
 
 def as_sent_on_change(signal: StampedSignal) -> StampedSignal:
     """Keep the last value of a signal that is sent on change until just before it jumps.
 
     A source with a dead band is silent while its value hardly changes. A straight line over such a
-    pause would have a stem move that sticks, while the force on it grows. Other signals are
-    returned as they are.
+    pause would move a stem that sticks while the force on it grows. Other signals are returned
+    unchanged.
     """
     pauses, steps = np.diff(signal.time), np.abs(np.diff(signal.value))
     usual = float(np.median(pauses))

@@ -215,7 +215,7 @@ def _viscous_by_lag(
 ) -> float:
     """Return the F_v, N·s/m, that the curve lacks because its lag differs from that of the fit.
 
-    While the stem slides, a stem that is seen later by τ looks as one with less F_v by k·τ.
+    While the stem slides, taking it as seen later by τ lowers F_v by k·τ.
     """
     lag = evidence.get(IMPERFECTIONS_FOUND, {}).get("lag")
     spring, _ = _known(

@@ -7,9 +7,9 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""What keeps value types valid: checks whose messages name the rule, and frozen mappings.
+"""Validation of value types: checks whose messages name the rule, and frozen mappings.
 
-Python neither copies nor pickles a mapping that nobody can change; `frozen` ones it does.
+Python neither copies nor pickles a read-only mapping; those of `frozen` can be copied and pickled.
 """
 
 import copyreg
@@ -20,7 +20,7 @@ from typing import Any
 
 
 def frozen(mapping: Mapping[Any, Any]) -> MappingProxyType[Any, Any]:
-    """Return a copy of a mapping that nobody can change."""
+    """Return a read-only copy of a mapping."""
     return MappingProxyType(dict(mapping))
 
 

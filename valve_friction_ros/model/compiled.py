@@ -14,7 +14,7 @@ A kernel is an ordinary Python function on scalars, arrays and named tuples. Dec
 process. It loops over its arrays: for an expression of whole arrays numba compiles broadcasting and
 messages about shapes as well, for seconds. A kernel may call kernels, and use numbers, of this
 folder and of its own: the cache is renewed when a file of either changes. Where no folder for a
-cache can be written, neither beside the sources nor at home, each process compiles anew. numba
+cache can be written, neither beside the sources nor at home, each process compiles again. numba
 (60 MB) is loaded by the first call of a kernel. The environment variable ``NUMBA_DISABLE_JIT=1``
 runs kernels as plain Python instead.
 """
@@ -40,7 +40,7 @@ _without_cache: set[str] = set()
 
 @cache
 def _tell_compilation() -> None:
-    """Log the first kernel that this process compiles; one out of the cache is not compiled."""
+    """Log the first kernel that this process compiles; a kernel from the cache is not compiled."""
     from numba.core import event  # noqa: PLC0415
 
     class FirstCompilation(event.Listener):  # type: ignore[misc]
@@ -52,7 +52,7 @@ def _tell_compilation() -> None:
                 _LOG.info("compiling numeric code, once after installation: about a minute")
 
         def on_end(self, _: object) -> None:
-            """Nothing is told."""
+            """Log nothing."""
 
     event.register("numba:compile", FirstCompilation())
 
@@ -67,7 +67,7 @@ def _sources(folder: Path) -> str:
 
 
 class _Kernel:
-    """A kernel that is handed to numba by its first use: its call, or that of one that calls it."""
+    """A kernel that is handed to numba at its first use: its call, or that of a kernel using it."""
 
     _making = threading.RLock()
 
@@ -79,7 +79,7 @@ class _Kernel:
         return self._numba_kernel(*arguments)
 
     def __getattr__(self, name: str) -> Any:
-        """Give what numba's kernel has, which includes the type that numba knows a kernel by."""
+        """Return an attribute of numba's kernel, such as the type by which numba knows a kernel."""
         if name != "_numba_kernel":
             return getattr(self._numba_kernel, name)
         with self._making:
@@ -108,7 +108,7 @@ def _numba_kernel(function: Callable[_P, _R], **options: Any) -> Callable[_P, _R
     _forgive_a_full_disk(kernel)
     _load_alone(kernel)
     folders = (Path(function.__code__.co_filename).parent, Path(__file__).parent)
-    # Numba renews a cache when the kernel's own file changes, and has nothing public to widen that.
+    # Numba renews a cache when the kernel's own file changes; it has no public way to widen that.
     # A plain function, and a kernel without a cache, have no such attribute.
     with contextlib.suppress(AttributeError):
         kernel._cache._cache_file._source_stamp = tuple(map(_sources, folders))  # noqa: SLF001
@@ -130,10 +130,10 @@ def _forgive_a_full_disk(kernel: Any) -> None:
 
 
 def _load_alone(kernel: Any) -> None:
-    """Take machine code out of the cache without all that numba needs to compile some.
+    """Load machine code from the cache without all that numba needs for compilation.
 
-    Numba would first register every function that it can compile, which takes longer than to load
-    the kernels of an identification. Compiling does that by itself.
+    Numba would first register every function that it can compile, which takes longer than loading
+    the kernels of an identification. Compilation does that by itself.
     """
     from numba.core.runtime import rtsys  # noqa: PLC0415
 
@@ -151,9 +151,9 @@ def _load_alone(kernel: Any) -> None:
 
 @cache
 def _without_scipy() -> None:
-    """Load what numba knows of arrays without `scipy.linalg`, as slow to load as numpy.
+    """Load numba's support of arrays without `scipy.linalg`, which is as slow to load as numpy.
 
-    It asks for scipy's BLAS, and does without where that is missing. No kernel multiplies matrices.
+    Numba asks for scipy's BLAS, and does without if it is missing. No kernel multiplies matrices.
     """
     name = "scipy.linalg.cython_blas"
     if name in sys.modules:
@@ -171,13 +171,13 @@ def kernels_are_cached() -> bool:
 
 
 def find_cache() -> bool:
-    """Return whether there is such a place, before anything is compiled; needs numba."""
+    """Return whether there is a place for the cache, before anything is compiled; needs numba."""
     _numba_kernel(find_cache)
     return kernels_are_cached()
 
 
 def note_cache(is_there: bool) -> None:
-    """Note whether another process, which is to compile, has found such a place."""
+    """Note whether another process, which will compile, has found a place for the cache."""
     if not is_there:
         _without_cache.add(find_cache.__name__)
 

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""What drives the stem in a recording: the pressure of an actuator, or a force itself."""
+"""The drive of the stem in a recording: the pressure of an actuator, or a force itself."""
 
 from enum import Enum
 
@@ -16,7 +16,7 @@ DEFAULT_LAG = 1.3
 
 
 class Drive(Enum):
-    """What drives the stem: its name in a sentence, and the unit in which people read it.
+    """The drive of the stem: its name in a sentence, and the unit in which people read it.
 
     Attributes
     ----------
@@ -25,7 +25,7 @@ class Drive(Enum):
     unit : str
         Unit in figures and tables.
     size : float
-        That unit in the SI unit of the samples, Pa or N.
+        Size of `unit` in the SI unit of the samples, Pa or N.
 
     Examples
     --------

@@ -36,7 +36,7 @@ BENCH_VALVE = Valve(
     pressure_minimum=0.0,
     pressure_maximum=250000.0,
 )
-"""Fisher ET globe valve; force counts from the bottom of the pressure range."""
+"""Fisher ET globe valve; force is measured from the bottom of the pressure range."""
 
 _POSITION_BIAS = 1.13e-3
 """x̄, m: the mean of (16)."""
@@ -175,7 +175,7 @@ class IsaSteps(Excitation):
     centre : float
         Pressure before each group of steps, Pa.
     span : float
-        Input range that the step sizes are shares of, Pa.
+        Input range to which the step sizes refer, Pa.
     sizes : tuple of float
         Step sizes as shares of `span`. A step of 50 % around mid-range spans the whole range.
     hold : float

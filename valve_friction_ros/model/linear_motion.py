@@ -26,7 +26,7 @@ where :math:`a_0` is the acceleration at t = 0 and :math:`j_0 = (f_1 - k v_0)/m`
 force and the spring would give without damping. No step size enters, so nothing can become
 unstable, however stiff the friction.
 
-With the Laplace transform 1/P of h, that of its derivative by :math:`\omega_0^2` is −1/P², and that
+The Laplace transform of h is 1/P, that of its derivative by :math:`\omega_0^2` is −1/P², and that
 by :math:`2\beta` is −p/P². All derivatives of the motion by damping and stiffness therefore follow
 from :math:`q = h * h`, the response convolved with itself, its slope and its integrals.
 """
@@ -38,7 +38,7 @@ from valve_friction_ros.model.compiled import compiled
 
 _MOST_TERMS = 64
 """Terms of a power series: where one is used, its terms fall faster than 2⁻ⁿ/n!, and some twenty
-count."""
+matter."""
 
 
 class Response(NamedTuple):
@@ -171,7 +171,7 @@ def impulse_response(damping: float, stiffness: float, time: float) -> Response:
 
 @compiled
 def _series_convolution(damping: float, stiffness: float, time: float) -> Response:
-    """Power series of h ∗ h: that of h drives it."""
+    """Power series of h ∗ h, driven by that of h."""
     friction, spring = damping * time, stiffness * time * time
     response, response_before = time, 0.0
     term, previous = 0.0, 0.0
@@ -266,7 +266,7 @@ def self_convolution(damping: float, stiffness: float, time: float, response: Re
     damping, stiffness, time : float
         As for `impulse_response`.
     response : Response
-        What that returned.
+        Its result.
 
     Returns
     -------
@@ -346,12 +346,12 @@ def sliding_friction(dynamics: Dynamics, speed: float) -> float:
 
 
 class FrictionFall(NamedTuple):
-    """What is left at one speed of the slip force ΔF = F_s − F_c, which falls with the speed.
+    """Remainder at one speed of the slip force ΔF = F_s − F_c, which falls with the speed.
 
     Attributes
     ----------
     share : float
-        The share that is left, exp(−(v/v_s)²); without a fall none is.
+        The share that is left, exp(−(v/v_s)²); 0 without a fall.
     by_stribeck : float
         Derivative of ΔF times that share by v_s, N·s/m.
     """
@@ -362,7 +362,7 @@ class FrictionFall(NamedTuple):
 
 @compiled
 def friction_fall(dynamics: Dynamics, speed: float) -> FrictionFall:
-    """Return what is left of the slip force at a speed, m/s."""
+    """Return the remainder of the slip force at a speed, m/s."""
     if dynamics.stribeck_velocity == 0.0:
         return FrictionFall(0.0, 0.0)
     ratio = speed / dynamics.stribeck_velocity

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""A recording: drive and stem position on one uniform grid, and with their own stamps; sensors."""
+"""A recording: drive and stem position on one uniform grid, and at their own stamps; sensors."""
 
 from dataclasses import dataclass, field
 from typing import ClassVar
@@ -79,12 +79,12 @@ class StampedRecord:
 _LARGEST = 1e12
 """Largest value of a sample, Pa, N or m.
 
-Chosen: a million times beyond any sensor, and far below what overflows where it is squared."""
+Chosen: a million times beyond any sensor, and far below values whose squares overflow."""
 
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """What drives the stem, and the stem position, sampled together at a constant period.
+    """Drive and stem position, sampled together at a constant period.
 
     Attributes
     ----------
@@ -97,12 +97,12 @@ class Recording:
     start_time : float
         Time of the first sample, s, on the clock of the stamps.
     stamped : StampedRecord, optional
-        The samples at their own stamps, where those are not the grid.
+        The samples at their own stamps, where those differ from the grid.
     driven_by : Drive
-        What `drive` is.
+        Kind of `drive`.
     gap : str
-        Refusal of a method that needs an unbroken record; empty for an unbroken one. In a gap the
-        samples are interpolated.
+        Message with which a method refuses a broken record; empty for an unbroken record. In a gap
+        the samples are interpolated.
 
     Raises
     ------

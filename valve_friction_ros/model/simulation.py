@@ -61,7 +61,7 @@ class Trajectory(NamedTuple):
 
 
 class _Ways(NamedTuple):
-    """Return the dynamics of both directions of motion."""
+    """Dynamics of both directions of motion."""
 
     upward: Dynamics
     downward: Dynamics

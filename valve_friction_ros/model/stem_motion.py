@@ -53,7 +53,7 @@ _ROOT_TOLERANCE = 1e-11
 """Step of Newton's method, over the time searched, after which only rounding is left."""
 
 _MOST_EVENTS = 1_000_000
-"""Events within a sample, or turns within a slide, with which the simulation is given up.
+"""Events within a sample, or turns within a slide, after which the simulation gives up.
 
 Of 288 simulations with samples of 1 ms to 1 s the busiest had 1089 events and 117 turns; a million
 take about a second.
@@ -61,7 +61,7 @@ take about a second.
 
 _MOST_TRIES = 64
 """Tries of a shorter chord. Each has at most two thirds of the length of the one before, so that
-the 52nd is shorter than a billionth of the sample, and is taken whatever it gives."""
+the 52nd is shorter than a billionth of the sample, and is accepted whatever it gives."""
 
 STRIBECK_STEP = 0.04
 """Approximate change of speed per chord, over the Stribeck velocity.

@@ -11,7 +11,7 @@
 
 A sample of sliding is a linear map; a friction that falls with the speed is followed by its chords.
 
-Friction may be graded by the sample, and the stem set anew after a gap. numba leaves out the
+Friction may be graded by the sample, and the stem reset after a gap. numba leaves out the
 branches of an argument that is None, so a simulation without them costs nothing more.
 """
 
@@ -162,7 +162,7 @@ class ChordLadder(NamedTuple):
 
 @compiled_products
 def rung_at(ladder: ChordLadder, speed: float) -> tuple[int, float, float, SlidingMap]:
-    """Return the number of the range with a speed, Coulomb and viscous friction, and the map."""
+    """Return the index of the range of a speed, Coulomb and viscous friction, and the map."""
     rung = min(int(speed / ladder.spacing), ladder.slides.shape[0] - 1)
     row = ladder.slides[rung]
     slide = SlidingMap(row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7], row[8])
@@ -200,13 +200,13 @@ _Signal = NDArray[np.float64] | None
 
 @compiled
 def _more(grip: _Signal, sample: int) -> float:
-    """Return by how much friction is graded at a sample, N."""
+    """Return the additional friction at a sample, N."""
     return 0.0 if grip is None else grip[sample]
 
 
 @compiled
 def _is_anew(anew: _Signal, sample: int) -> bool:
-    """Return whether the stem is set anew at a sample."""
+    """Return whether the stem is reset at a sample."""
     return False if anew is None else not np.isnan(anew[sample])
 
 
@@ -393,8 +393,8 @@ def _carry_falling(
 ) -> None:
     """Carry the derivatives through the samples that `_slide_on_falling` has filled in.
 
-    What a parameter changes in the balance of forces at both ends of a sample is taken for linear
-    between them.
+    The change of the balance of forces by a parameter is taken as linear between both ends of a
+    sample.
     """
     if tangent is None or first == last:
         return
@@ -455,9 +455,9 @@ def run_stem(
 
     Rest and sliding over several samples take short cuts; `advance_stem` steps all samples between
     them, and so every sample with an event. `grip` (N) is added to the Coulomb and the static
-    friction of each sample. Where `anew` is a number, the stem is set to that place (m) and to the
-    velocity `leaving` (m/s). A `tangent`, set up for the first sample, is carried along. The
-    samples that took no short cut are counted and returned.
+    friction of each sample. Where `anew` is a number, the stem is reset to that position (m) and to
+    the velocity `leaving` (m/s). A `tangent`, set up for the first sample, is carried along.
+    Returns the number of samples that took no short cut.
     """
     up, down = sliding_map(upward, period), sliding_map(downward, period)
     steps_up, steps_down = chord_ladder(upward, period), chord_ladder(downward, period)

@@ -16,12 +16,12 @@ the event changes too (saltation). With the derivative δ at a fixed time and th
 - a stem that comes to rest at the speed w (zero, or the limit velocity) does so later by
   dt = (dw − δv)/a; from then on δx is δx + w·dt, and δv is 0;
 - a stem that breaks away does so later by dt = (dF_s − δ(F − k·x))/Ḟ; from then on δv is −a·dt,
-  with the acceleration a behind the breakaway, and δx is as before;
+  with the acceleration a after the breakaway, and δx is as before;
 - a stem that turns without a rest breaks away when it has stopped: both with the same dt;
 - at a travel stop both are 0.
 
 Friction that falls with the speed is a chord between two speeds there. At the second one it drops,
-later by dt = −δv/a, so that from then on δv is δv·a′/a with the acceleration a′ behind the drop.
+later by dt = −δv/a, so that from then on δv is δv·a′/a with the acceleration a′ after the drop.
 """
 
 from typing import NamedTuple
@@ -46,7 +46,7 @@ zero, the time of the drop has no derivative."""
 
 
 class Tangent(NamedTuple):
-    """Derivatives by p parameters: of what drives the stem, and of the stem itself.
+    """Derivatives by p parameters: of the drive of the stem, and of the stem itself.
 
     Attributes
     ----------
@@ -61,7 +61,7 @@ class Tangent(NamedTuple):
     state : ndarray of float, shape (2, p)
         Of the stem's position and velocity, where the simulation is.
     facing : ndarray of float, shape (5, p)
-        What `face` sets up.
+        Values that `face` sets up.
     late : ndarray of float, shape (p,)
         Of the time at which it last came to rest.
     pull, rate, grip : ndarray of float, shape (p,)
@@ -97,9 +97,9 @@ class Phase(NamedTuple):
     side : float
         1 for upwards, −1 for downwards.
     begin, duration : float
-        Time since the begin of the step, s, and length, s.
+        Time since the beginning of the step, s, and length, s.
     position, speed, pull : float
-        At its begin, m, m/s, and the force less spring and preload, N.
+        At its beginning, m, m/s, and the force less spring and preload, N.
     slope : float
         Rate of the force, N/s.
     way : Dynamics
@@ -160,7 +160,7 @@ def no_tangent(
 
 @compiled
 def set_anew(tangent: Tangent | None, sample: int) -> None:
-    """Begin anew at a measured place, which depends on no parameter."""
+    """Restart at a measured position, which depends on no parameter."""
     if tangent is None:
         return
     for one in range(tangent.late.size):
@@ -169,7 +169,7 @@ def set_anew(tangent: Tangent | None, sample: int) -> None:
 
 @compiled
 def keep(tangent: Tangent | None, first: int, last: int) -> None:
-    """Write down the derivative of the position for the samples after `first` up to `last`."""
+    """Store the derivative of the position for the samples after `first` up to `last`."""
     if tangent is None:
         return
     for sample in range(first + 1, last + 1):
@@ -179,7 +179,7 @@ def keep(tangent: Tangent | None, first: int, last: int) -> None:
 
 @compiled
 def begin_step(tangent: Tangent | None, sample: int, period: float) -> None:
-    """Set up what drives the stem between a sample and the next, its friction as their mean."""
+    """Set up the drive of the stem between a sample and the next, its friction as their mean."""
     if tangent is None:
         return
     for one in range(tangent.late.size):
@@ -201,9 +201,9 @@ def leave(
     time: float,
     cause: int,
 ) -> None:
-    """Break away from a rest to `side` at a place (not mirrored), `time` into the step.
+    """Break away from a rest to `side` at a position (not mirrored), `time` into the step.
 
-    `acceleration` is the one behind the breakaway, m/s², and `slope` the rate of the force, N/s,
+    `acceleration` is that after the breakaway, m/s², and `slope` the rate of the force, N/s,
     both mirrored, `stiffness` that of the spring, N/m; `cause` is one of `WAITED`, `TURNS` and
     `LET_GO`.
     """
@@ -280,7 +280,7 @@ def carry_slide(tangent: Tangent, phase: Phase) -> None:
 
 @compiled
 def face(tangent: Tangent, side: float) -> None:
-    """Set up what `run_stem` takes of the parameters, for sliding to one side."""
+    """Set up the derivatives that `run_stem` uses, for sliding to one side."""
     ways = tangent.upward if side > 0.0 else tangent.downward
     for one in range(tangent.late.size):
         tangent.facing[0, one] = 1.0 - (1.0 + side) * tangent.of_friction[one]

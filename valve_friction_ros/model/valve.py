@@ -30,7 +30,7 @@ class Valve:
     ----------
     diaphragm_area : float, optional
         Effective area S_a of the actuator diaphragm, m²; None for a machine without a diaphragm,
-        which a force drives.
+        which is driven by a force.
     pressure_reference : float
         Pressure P_ref at which the actuator exerts no force, Pa: 101325 for a sensor of
         absolute pressure, 0 for a gauge sensor.
@@ -73,7 +73,7 @@ class Valve:
 
     @property
     def driven_by(self) -> Drive:
-        """What drives the stem."""
+        """The drive of the stem."""
         return Drive.FORCE if self.diaphragm_area is None else Drive.PRESSURE
 
     @property
@@ -82,7 +82,7 @@ class Valve:
         return 1.0 if self.diaphragm_area is None else self.diaphragm_area
 
     def actuator_force(self, drive: _Samples) -> _Samples:
-        """Force F_ext = S_a·(P − P_ref) in N at a pressure in Pa; a force is passed on."""
+        """Force F_ext = S_a·(P − P_ref) in N at a pressure in Pa; a force is unchanged."""
         if self.diaphragm_area is None:
             return drive
         return self.diaphragm_area * (drive - self.pressure_reference)

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The stroke test from which the friction of a valve will be known best; no ROS."""
+"""Planning of the stroke test that determines the friction of a valve best; no ROS."""
 
 from typing import TYPE_CHECKING
 

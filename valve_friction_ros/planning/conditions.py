@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""What a stroke test may do to a valve, and what will measure it."""
+"""Limits of a stroke test, and the conditions of its measurement."""
 
 import math
 from collections.abc import Mapping
@@ -26,17 +26,17 @@ AIMS: Mapping[str, tuple[str, ...]] = MappingProxyType(
         **{name: (name,) for name in (*_FRICTION, SLIDING, "spring_constant")},
     }
 )
-"""What a test may be for: the numbers whose intervals count."""
+"""Aims of a test: the numbers whose intervals matter."""
 
 
 @dataclass(frozen=True)
 class Limits:
-    """What a stroke test may do.
+    """Limits of a stroke test.
 
     Attributes
     ----------
     lowest, highest : float
-        Part of the travel that the stem may move in, shares of the travel, 0 to 1.
+        Part of the travel in which the stem may move, shares of the travel, 0 to 1.
     speed : float
         Largest speed of the sliding stem, m/s.
     duration : float
@@ -46,8 +46,8 @@ class Limits:
     pressure_minimum, pressure_maximum : float
         Pressures that may be set, Pa.
     stop_margin : float
-        Share of the travel that a stem without any friction would keep from either stop: for what
-        is not known of the spring.
+        Share of the travel that a stem without any friction would keep from either stop: an
+        allowance for an uncertain spring.
     allow_stops : bool
         Whether the stem may reach seat and stop.
 
@@ -94,7 +94,7 @@ class Limits:
 
 @dataclass(frozen=True)
 class Conditions:
-    """What will measure a stroke test.
+    """Sampling, sensor noise and converter of a stroke test.
 
     Attributes
     ----------

@@ -9,7 +9,7 @@
 
 """A planned stroke test as it is played on a valve: set points in time, and limits that end it.
 
-Nothing here knows a clock or a bus: whoever plays says what time it is and what was heard.
+This module has no clock and no bus: its caller gives the time and the received samples.
 """
 
 import math
@@ -22,33 +22,33 @@ from valve_friction_ros.wording import played_test_words
 
 
 class PlayPhase(Enum):
-    """Where a test stands."""
+    """Phase of a test."""
 
     WAITING = auto()
-    """Nothing is set."""
+    """No pressure is set."""
     PLAYING = auto()
     ENDED = auto()
     """Played to its end; the last set point stays."""
     BACK = auto()
-    """Ended before its time; the pressure of its begin is set."""
+    """Aborted; the initial pressure is set."""
 
 
 class Abort(Enum):
-    """Why a test goes back before its end."""
+    """Why a test returns to its initial pressure before its end."""
 
     POSITION = auto()
     PRESSURE = auto()
     SILENT_STEM = auto()
     SILENT_PRESSURE = auto()
     HELD_UP = auto()
-    """The player itself stood still: set points would have jumped."""
+    """The player itself stalled: set points would have jumped."""
     ASKED = auto()
     SHUTDOWN = auto()
 
 
 @dataclass(frozen=True)
 class PlayLimits:
-    """What ends a test at once.
+    """Limits that end a test at once.
 
     Attributes
     ----------
@@ -73,7 +73,7 @@ class PlayLimits:
     duration: float = 3600.0
 
     def __post_init__(self) -> None:
-        """Refuse limits that would end nothing."""
+        """Refuse limits that would never end a test."""
         for name in ("position", "pressure"):
             low, high = getattr(self, name)
             if not -math.inf < low < high < math.inf:
@@ -87,23 +87,23 @@ class PlayLimits:
 
 
 class PlayedTest:
-    """A stroke test that is played once each time it is started, and goes back when it must.
+    """A stroke test that is played once per start, and returns to its initial pressure on an abort.
 
     Times are seconds of a clock that does not go back.
 
     Parameters
     ----------
     signal : SampledPressure
-        The pressure to set; it is brought there by hand before the start.
+        The pressure to set; its first value is set by hand before the start.
     limits : PlayLimits
-        What ends it.
+        Limits that end the test.
 
     Attributes
     ----------
     phase : PlayPhase
-        Where it stands.
+        Phase of the test.
     aborted : Abort or None
-        Why it went back.
+        Why it was aborted.
     """
 
     def __init__(self, signal: SampledPressure, limits: PlayLimits) -> None:
@@ -128,15 +128,15 @@ class PlayedTest:
 
     @property
     def home(self) -> float:
-        """Pressure of its begin, Pa, to which it goes back."""
+        """Initial pressure, Pa, to which an abort returns."""
         return float(self.signal.pressures[0])
 
     def heard_stem(self, position: float, now: float) -> None:
-        """Take a position of the stem, m. While it plays, any sample beyond the limits ends it."""
+        """Receive a position of the stem, m; a sample beyond the limits ends a playing test."""
         self._hear("position", position, now)
 
     def heard_pressure(self, pressure: float, now: float) -> None:
-        """Take a measured pressure, Pa."""
+        """Receive a measured pressure, Pa."""
         self._hear("pressure", pressure, now)
 
     def _hear(self, name: str, value: float, now: float) -> None:
@@ -145,7 +145,7 @@ class PlayedTest:
             self._pending = self._beyond(name)
 
     def _beyond(self, name: str) -> Abort | None:
-        """Return whether the last sample of a signal lies beyond its limits; nan does."""
+        """Return the abort if the last sample of a signal is beyond its limits, or nan."""
         low, high = getattr(self.limits, name)
         value, _ = self._heard[name]
         if low <= value <= high:
@@ -169,7 +169,8 @@ class PlayedTest:
     def start(self, now: float) -> None:
         """Begin to play.
 
-        Raises RefusalError if it plays already, or the signals do not come or lie beyond limits.
+        Raises RefusalError if the test is playing already, or the signals are missing or beyond
+        their limits.
         """
         if self.phase is PlayPhase.PLAYING:
             raise RefusalError("the test is running: stop it first")
@@ -180,12 +181,12 @@ class PlayedTest:
         self._begun = self._stepped = now
 
     def abort(self, why: Abort) -> None:
-        """Go back at once, if it plays."""
+        """Return to the initial pressure at once, if the test is playing."""
         if self.phase is PlayPhase.PLAYING:
             self.phase, self.aborted = PlayPhase.BACK, why
 
     def step(self, now: float) -> float | None:
-        """Return the pressure, Pa, that is to be set now; None where nothing is."""
+        """Return the pressure, Pa, to set now; None if no pressure is set."""
         if self.phase is PlayPhase.WAITING:
             return None
         if self.phase is PlayPhase.PLAYING:
@@ -207,7 +208,7 @@ class PlayedTest:
         return played_test_words(why.name, *self._told)
 
     def __str__(self) -> str:
-        """Return where it stands, on one line."""
+        """Return the state of the test, on one line."""
         if self.phase is PlayPhase.BACK and self.aborted is not None:
             return f"returned to {self.home / 1e3:.4g} kPa: {self._words(self.aborted)}"
         return {

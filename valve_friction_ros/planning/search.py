@@ -9,8 +9,8 @@
 
 """The search for the stroke test with the smallest predicted intervals.
 
-A forecast says what a test will do to a valve and what will be known after it; remarks say what the
-people who play the test must know.
+A forecast predicts the motion of a valve in a test and the intervals that follow from it; remarks
+say what the people who play the test must know.
 """
 
 import itertools
@@ -50,7 +50,7 @@ from valve_friction_ros.planning.stroke_test import (
 )
 
 _MOST_SAMPLES = 12_000
-"""Samples that a forecast simulates: of more, so many with as much less noise tell the same."""
+"""Most samples that a forecast simulates: fewer samples with less noise give the same intervals."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +62,7 @@ class SimulatedTest:
     sample_period : float
         Time between two samples, s.
     pressure : ndarray of float, shape (n,)
-        Behind the converter, Pa.
+        Pressure behind the converter, Pa.
     stem : Trajectory
         Position and velocity of the stem.
     """
@@ -74,7 +74,7 @@ class SimulatedTest:
 
 @dataclass(frozen=True)
 class Forecast:
-    """What will be known of one valve.
+    """Forecast for one valve: its motion, and the intervals of its parameters.
 
     Attributes
     ----------
@@ -87,7 +87,7 @@ class Forecast:
     top_speed : float
         Largest speed, m/s.
     breakaways : int
-        How often the stem breaks away.
+        Number of breakaways of the stem.
     refusal : str
         Why the identification would refuse the record; empty if it would not.
     """
@@ -101,7 +101,7 @@ class Forecast:
     refusal: str = ""
 
     def relative(self, name: str) -> float:
-        """Half width over the value, inf where either is not there."""
+        """Half width over the value, inf where either is missing."""
         value = abs(self.values.get(name, 0.0))
         return self.half_widths[name] / value if value and name in self.half_widths else math.inf
 
@@ -131,9 +131,9 @@ def forecast(
     *,
     with_competitors: bool = False,
 ) -> Forecast:
-    """Tell what the identification will know from a simulated test.
+    """Predict what the identification will determine from a simulated test.
 
-    The noise is one sample of what the sensors have, the same for each test: the width of an
+    The noise is one realisation of the sensors' noise, the same for each test: the width of an
     interval hardly depends on it.
     """
     period, pressure, stem = motion.sample_period, motion.pressure, motion.stem
@@ -169,11 +169,11 @@ def forecast(
 _SHAPES = (("full",), ("stairs",), ("turning",), ("full", "stairs"))
 _SPEEDS = ((1.0,), (0.4,), (0.15,), (1.0, 0.4), (1.0, 0.15), (1.0, 0.3, 0.1))
 _HOLDS = (0.1, 0.3, 1.0, 4.0)
-"""Shapes, speeds and holds (s) whose combinations the search begins with."""
+"""Shapes, speeds and holds (s) with whose combinations the search begins."""
 
 _FACTORS = (0.6, 0.8, 1.25, 1.6)
 _ROUNDS = 8
-"""Factors by which a speed or the hold is changed, and how often a start is improved on at most."""
+"""Factors by which a speed or the hold is changed, and most improvements of a start."""
 
 _MIXES = tuple(one for count in (1, 2) for one in itertools.permutations(SHAPES, count))
 """Shapes that a neighbour may have."""
@@ -181,12 +181,12 @@ _MIXES = tuple(one for count in (1, 2) for one in itertools.permutations(SHAPES,
 _LONGEST_HOLD = 5.0
 
 _REFUSAL_LOSS = 3.0
-"""Loss of a refused record: as of one whose intervals are e³ times wider than those of another."""
+"""Loss of a refused record: that of a record whose intervals are e³ times wider than others."""
 
 
 @dataclass(frozen=True)
 class StrokePlan:
-    """A stroke test, and what is to be expected of it.
+    """A stroke test with its forecasts.
 
     Attributes
     ----------
@@ -197,17 +197,17 @@ class StrokePlan:
     band : PressureBand
         Pressures between which it moves.
     frictions : FrictionRange
-        The valves that it is for.
+        The valves for which it is planned.
     forecasts : tuple of Forecast
-        What will be known of each.
+        Forecast for each valve.
     limits : Limits
-        What it keeps to.
+        Limits that it keeps to.
     conditions : Conditions
-        What measures it.
+        Conditions of its measurement.
     aim : str
-        What it is for, of `AIMS`.
+        Its aim, one of `AIMS`.
     tried : int
-        Tests that were compared.
+        Number of tests that were compared.
     """
 
     test: StrokeTest
@@ -222,12 +222,12 @@ class StrokePlan:
 
     @property
     def likely(self) -> Forecast:
-        """What will be known of the most likely valve."""
+        """Forecast for the most likely valve."""
         return self.forecasts[self.frictions.middle]
 
 
 def _neighbours(pattern: Pattern) -> list[Pattern]:
-    """Return patterns that differ in one thing."""
+    """Return patterns that differ in one property."""
     found = []
     for place, factor in itertools.product(range(len(pattern.speeds)), _FACTORS):
         speeds = list(pattern.speeds)
@@ -282,8 +282,8 @@ class _Search:
     def loss(self, pattern: Pattern, place: int) -> float:
         """Mean logarithm of w/(1 + w), with w the half widths over their values.
 
-        It is that of w where w is small, and no number counts that nobody will know anyway. A test
-        that tells nothing of a valve is worse than one that tells little.
+        For small w it is the mean logarithm of w; a number that stays unknown in any test has no
+        effect. A test that determines nothing of a valve is worse than one that determines little.
         """
         if (pattern, place) not in self.known:
             test, found = self.test(pattern), _REFUSAL_LOSS
@@ -305,7 +305,7 @@ class _Search:
         return sum(self.loss(pattern, place) for place in draws) / len(draws)
 
     def patterns(self) -> list[Pattern]:
-        """Return the patterns to begin with that the duration has room for."""
+        """Return the initial patterns that fit into the duration."""
         found = [Pattern(*one) for one in itertools.product(_SHAPES, _SPEEDS, _HOLDS)]
         fitting = [one for one in found if self.test(one) is not None]
         if not fitting:
@@ -323,7 +323,7 @@ class _Search:
         for count, one in enumerate(first):
             self.likely(one)
             progress(0.5 * (count + 1) / len(first))
-        # The loss has many valleys, so that the best pattern of each shape is improved on.
+        # The loss has many valleys, so the best pattern of each shape is improved.
         starts = [
             min(same, key=self.likely)
             for shapes in _SHAPES
@@ -360,39 +360,39 @@ def plan_test(
     """Find the stroke test with the smallest predicted intervals.
 
     Patterns of strokes, with speeds, turns, stairs and holds, are simulated with each valve of the
-    range; the posterior of the method ``plant`` tells the half widths (`expected_half_widths`). The
-    mean logarithm of their shares of the values, over the numbers of the aim and over the valves,
-    decides: it is the D-criterion of these numbers if they are taken as independent.
+    range; the posterior of the method ``plant`` gives the half widths (`expected_half_widths`). The
+    criterion is the mean logarithm of their shares of the values, over the numbers of the aim and
+    over the valves: the D-criterion of these numbers if they are taken as independent.
 
     Parameters
     ----------
     valve : Valve
         Geometry and pressure range.
     frictions : FrictionRange
-        What is known of friction and spring.
+        Prior knowledge of friction and spring.
     limits : Limits, optional
-        What the test may do.
+        Limits of the test.
     conditions : Conditions, optional
-        What will measure it.
+        Conditions of its measurement.
     settings : IdentificationSettings, optional
-        Those of the identification to come.
+        Settings of the later identification.
     aim : str
-        What the test is for, of `AIMS`.
+        Aim of the test, one of `AIMS`.
     progress : callable, optional
-        Takes the share of the work that is done.
+        Called with the share of the work that is done.
 
     Returns
     -------
     StrokePlan
-        The test and its forecasts. It depends on no clock and no chance. The search is local, from
-        several starts: of eight problems a global one (differential evolution, thousands of tests)
-        found intervals that were at most 13 % narrower.
+        The test and its forecasts. They depend on no clock and no chance. The search is local, from
+        several starts: in eight problems a global search (differential evolution, thousands of
+        tests) found intervals that were at most 13 % narrower.
 
     Raises
     ------
     RefusalError
-        If no test within the limits moves the stem, or none is known from it; one line with what
-        to relax.
+        If no test within the limits moves the stem, or none determines its friction; the message
+        is one line with what to relax.
     ValueError
         If there is no such aim, or the valve has no diaphragm or no travel.
 
@@ -432,15 +432,15 @@ def plan_test(
 
 
 _OVERTRAVEL = 5e-3
-"""Share of the travel by which a simulated stem may leave its part before it is said."""
+"""Share of the travel by which a simulated stem may leave its part without a remark."""
 
 _FASTER_RATIO = 1.05
 _UNKNOWN_REL_HALF_WIDTH = 0.5
-"""Half width over the value from which on a number is called unknown."""
+"""Half width over the value above which a number is called unknown."""
 
 
 def _resting(plan: StrokePlan) -> Iterator[str]:
-    """Yield the valves of the range that will not move."""
+    """Yield a remark for each valve that may not move, or whose record would be refused."""
     for name, one, draw in zip(
         plan.frictions.names, plan.forecasts, plan.frictions.draws, strict=True
     ):
@@ -455,7 +455,7 @@ def _resting(plan: StrokePlan) -> Iterator[str]:
 
 
 def _reaches(plan: StrokePlan) -> Iterator[str]:
-    """Yield that the stem may leave its part of the travel."""
+    """Yield remarks that the stem may leave, or not reach the end of, its part of the travel."""
     valve, limits = plan.valve, plan.limits
     if plan.band.low <= lowest_pressure(valve):
         yield (
@@ -522,7 +522,7 @@ def _model(one: Forecast) -> Iterator[str]:
 
 
 def plan_remarks(plan: StrokePlan) -> tuple[str, ...]:
-    """Return a sentence for each thing to be known before a test is played."""
+    """Return a sentence for each fact to know before a test is played."""
     return (
         *_resting(plan),
         *_reaches(plan),

@@ -22,7 +22,7 @@ from valve_friction_ros.planning.stroke_test import FrictionRange
 from valve_friction_ros.wording import two_digits
 
 _LOW_CURRENT, _CURRENT_SPAN = 4.0, 16.0
-"""mA of a signal of 0 %, and from there to 100 %."""
+"""Current of a signal at 0 %, and from there to 100 %, mA."""
 _LEVEL = 1e-6
 """Change of pressure, share of the band, below which a step is a hold."""
 _QUICK = 0.9
@@ -35,11 +35,11 @@ class ShownUnit(NamedTuple):
     Attributes
     ----------
     name : str
-        As ``psi``.
+        Name, such as ``psi``.
     size : float
-        One of it in SI.
+        Size in SI.
     finest : float
-        What is shown of a value, in SI.
+        Resolution to which a value is shown, in SI.
     """
 
     name: str
@@ -47,7 +47,7 @@ class ShownUnit(NamedTuple):
     finest: float
 
     def shown(self, value: float, fewer: int = 0) -> str:
-        """Return a value in SI in this unit, without its `fewer` last decimals."""
+        """Return an SI value in this unit, without its `fewer` last decimals."""
         digits = math.ceil(math.log10(self.size / self.finest) - 1e-9) - fewer
         return f"{value / self.size:.{max(digits, 0)}f}"
 
@@ -57,14 +57,14 @@ class ShownUnit(NamedTuple):
 
 
 FINEST_PRESSURE, FINEST_POSITION = 1.0, 1e-5
-"""Pa and m to which a table shows set points and limits. Chosen: finer than any converter."""
+"""Resolution of set points and limits in a table, Pa and m. Chosen: finer than any converter."""
 KPA, MM = ShownUnit("kPa", 1e3, FINEST_PRESSURE), ShownUnit("mm", 1e-3, FINEST_POSITION)
 
 
 def signal_range(valve: Valve, frictions: FrictionRange) -> tuple[float, float]:
     """Return the pressures of 0 and 100 %, Pa: those between which the spring alone moves the stem.
 
-    A positioner's set point in percent is then where a stem without friction stands.
+    A positioner's set point in percent is then the position of a stem without friction.
     """
     constant, preload = frictions.spring
     return valve.actuator_drive(preload), valve.actuator_drive(preload + constant * valve.travel)
@@ -72,21 +72,21 @@ def signal_range(valve: Valve, frictions: FrictionRange) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class SetPoint:
-    """A step of a test: within `duration`, go evenly to a pressure.
+    """A step of a test: a ramp to a pressure within `duration`.
 
     Attributes
     ----------
     time, duration : float
-        When it begins, and how long it takes, s.
+        Beginning and length, s.
     pressure : float
-        At its end, Pa.
+        Pressure at its end, Pa.
     share : float
-        The same as a share of the signal's range.
+        `pressure` as a share of the signal's range.
     stem : tuple of float
-        Shares of the travel between which the stem has to be from then on until the next step ends:
+        Shares of the travel between which the stem must be from then on until the next step ends:
         beyond them the test is aborted.
     tells : str
-        What the step is for.
+        Purpose of the step.
     """
 
     time: float
@@ -128,7 +128,7 @@ def set_points(
     signal : tuple of float, optional
         Pressures of a signal of 0 and 100 %, Pa; by default `signal_range`.
     margin : float
-        Share of the travel by which the stem may leave what any of the planned valves does.
+        Share of the travel by which the stem may leave the reach of all planned valves.
 
     Raises
     ------

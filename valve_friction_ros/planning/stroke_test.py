@@ -39,14 +39,14 @@ delays 0.02, 0.22 and 0.34 s, and whose ratios 1.0, 1.0 and 1.4."""
 
 @dataclass(frozen=True)
 class FrictionRange:
-    """Valves among which the true one is taken to be.
+    """Valves that span the possible frictions of the true valve.
 
     Attributes
     ----------
     draws : tuple of KarnoppParameters
         The valves; the middle one is the most likely. All have the same spring.
     names : tuple of str
-        What to call each.
+        Name of each.
 
     Raises
     ------
@@ -67,7 +67,7 @@ class FrictionRange:
 
     @property
     def middle(self) -> int:
-        """Place of the most likely valve."""
+        """Index of the most likely valve."""
         return len(self.draws) // 2
 
     @property
@@ -100,7 +100,7 @@ def known_friction(
     viscous_friction : float, optional
         F_v, N·s/m; by default that of a delay F_v/k of 0.1 s.
     factor : float
-        All frictions may be so many times larger or smaller, at least 1.
+        All frictions may be larger or smaller by this factor, at least 1.
     """
     require_positive("coulomb_friction", coulomb_friction)
     if not require_finite("factor", factor) >= 1:
@@ -132,7 +132,7 @@ def _scaled(valve: KarnoppParameters, factor: float) -> KarnoppParameters:
 
 
 def unknown_friction(valve: Valve, spring: tuple[float, float], mass: float) -> FrictionRange:
-    """Return three valves for a friction that nobody knows: 1.5, 5 and 15 % of the spring's force.
+    """Return three valves for an unknown friction: 1.5, 5 and 15 % of the spring's force.
 
     `spring` is as for `known_friction`; the valve gives the travel.
     """
@@ -161,9 +161,9 @@ class PressureBand(NamedTuple):
     Attributes
     ----------
     low, high : float
-        Pa.
+        Lowest and highest pressure, Pa.
     rate : float
-        Pa/s.
+        Largest rate of the pressure, Pa/s.
     """
 
     low: float
@@ -184,8 +184,8 @@ def _held(one: KarnoppParameters) -> float:
 def stroke(valve: Valve, one: KarnoppParameters, band: PressureBand) -> float:
     """Return the distance, m, between the rests at both ends of a band; negative: no motion.
 
-    A stroke is S_a·ΔP − 2·F_c over k. A stem that stands in the middle breaks away if
-    S_a·ΔP/2 > F_s; it may do so where it stands elsewhere, but nobody knows where it stands.
+    A stroke is S_a·ΔP − 2·F_c over k. A stem that rests in the middle breaks away if
+    S_a·ΔP/2 > F_s; it may do so elsewhere, but the place where it rests is unknown.
     """
     span = valve.force_per_drive * (band.high - band.low)
     if span <= 2 * one.static_friction:
@@ -196,7 +196,7 @@ def stroke(valve: Valve, one: KarnoppParameters, band: PressureBand) -> float:
 def frictionless_reach(
     valve: Valve, frictions: FrictionRange, band: PressureBand
 ) -> tuple[float, float]:
-    """Return where a stem without friction would stand at both ends of a band, m."""
+    """Return where a stem without friction would rest at both ends of a band, m."""
     constant, preload = frictions.spring
     low, high = ((valve.actuator_force(one) - preload) / constant for one in (band.low, band.high))
     return low, high
@@ -206,7 +206,7 @@ def lowest_pressure(valve: Valve) -> float:
     """Return the lowest pressure that a converter can set, Pa: that of the atmosphere.
 
     There the actuator exerts no force. It is the reference of the valve: 0 for a gauge sensor,
-    101325 Pa for one of absolute pressure.
+    101325 Pa for a sensor of absolute pressure.
     """
     return valve.pressure_reference
 
@@ -301,13 +301,13 @@ SHAPES = {
     "turning": (1.0, 0.4, 1.0, 0.0, 0.6, 0.0),
     "stairs": (0.25, 0.5, 0.75, 1.0, 0.75, 0.5, 0.25, 0.0),
 }
-"""Levels that a cycle goes to in turn, shares of the band; each cycle begins at the lower end.
+"""Levels of a cycle in turn, shares of the band; each cycle begins at the lower end.
 
-A full stroke slides longest; one that turns on its way breaks away more often; stairs stop and
-start again in the same direction."""
+A full stroke slides longest; a turning stroke breaks away more often; stairs stop and start again
+in the same direction."""
 
 FEWEST_CYCLES = 2
-"""Cycles in a test: three strokes and more give a number a verdict better than weak."""
+"""Fewest cycles in a test: with three strokes or more a verdict can be better than weak."""
 
 _MIDDLE = 0.5
 _BEFORE = 1.0
@@ -319,7 +319,7 @@ _SHORTEST_HOLD = 1e-3
 
 @dataclass(frozen=True)
 class Pattern:
-    """What repeats in a stroke test; cycle after cycle takes the next shape and the next speed.
+    """The pattern that repeats in a stroke test; each cycle takes the next shape and speed.
 
     Attributes
     ----------
@@ -374,7 +374,7 @@ class StrokeTest:
     pattern : Pattern
         Its pattern.
     cycles : int
-        How often the stem goes up and down again.
+        Number of times that the stem goes up and down again.
     """
 
     times: NDArray[np.float64] = field(repr=False)
@@ -407,7 +407,7 @@ def stroke_test(pattern: Pattern, band: PressureBand, duration: float) -> Stroke
     """Return the test of a pattern that lasts at most `duration` s; None if that is too short.
 
     It begins and ends with a hold at the middle pressure of the band, where the stem rests on that
-    side of its middle from which it came. Each of its kinds of cycles is there.
+    side of its middle from which it came. It has each kind of cycle.
     """
     span_time = (band.high - band.low) / band.rate
     ends = _BEFORE + 2 * (_MIDDLE * span_time + pattern.hold)

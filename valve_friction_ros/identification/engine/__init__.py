@@ -7,4 +7,4 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The fit in which every imperfection of a plant takes part, with a stated prior."""
+"""The fit that includes every imperfection of a plant, each with a stated prior."""

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""What the force balance leaves open: the lag, falls of the friction, rare imperfections."""
+"""Posterior of the force balance: lag, fall of friction with speed, rare imperfections."""
 
 import copy
 import itertools
@@ -48,27 +48,28 @@ _SLIPPING, _SLIP, _SLIP_SPREAD = 0.5, 0.35, 0.2
 """Stribeck speeds of packings, m/s, each as likely as the next; the share of packings that slip,
 and mean and deviation of their slip force over the friction: F_s is 1.15 to 2 times F_c.
 
-A record that is slower does not show how far friction falls: these say it for dry and viscous
+A slower record does not show how far friction falls: these values then apply to dry and viscous
 friction."""
 
 _STRIBECK_SPEEDS = np.geomspace(0.04, 0.6, 8)
 _STRIBECK_WORTH = 1.05
 _STRIBECK_OPEN = 1.08
-"""Stribeck speeds over twice the mean speed; by how much one must lower the residual to be taken;
-and up to which residual others stay open."""
+"""Stribeck speeds over twice the mean speed; factor by which one must lower the residual to be
+accepted; and factor of the residual up to which others stay open."""
 
 _OF_NO_LAW = (SLIDING, "spring_constant", "spring_preload", "mass")
-"""Numbers that no law of friction over speed takes part in."""
+"""Numbers that do not depend on a law of friction over speed."""
 
 _SPLIT = ("coulomb_friction", "viscous_friction")
-"""What the friction is made of once it has ceased to fall with speed."""
+"""Components of the friction once it has ceased to fall with speed."""
 
 _RARE = ("along_travel", "in_record", "viscous_asymmetry", "curvature", "cubic", "drift")
 _HOW_RARE, _ABSENT = 0.25, 0.1
 _LEAST_PROBABLE = 1e-2
 """Imperfections that most plants do not have: the share of plants that have each; the deviation of
-its prior in the others over that in these; and the least probability of a choice of them that is
-kept, over the likeliest. Two that make up for each other are then less probable than none.
+its prior in the other plants over that in these; and the least probability, over the likeliest, of
+a choice of imperfections that is kept. Two that compensate each other are then less probable than
+none.
 
 Chosen: most plants have one or two of the six."""
 
@@ -77,7 +78,7 @@ _LARGEST_SCATTER = 25.0
 
 
 def _heavy_tailed(deviations: _Array) -> _Array:
-    """Return the logarithm of Student's t density of two degrees of freedom, but for a constant."""
+    """Return the logarithm of Student's t density of two degrees of freedom, up to a constant."""
     return np.asarray(-1.5 * np.log1p(deviations**2 / 2.0))
 
 
@@ -113,9 +114,9 @@ def _choices(regression: Regression, solved: Solved, scores: _Array) -> list[_Ch
 
 
 def _falls(regression: Regression, solved: Solved, variance: float) -> list[_Choice]:
-    """Return the solution for each probable fall of the friction with speed, none among them.
+    """Return the solution for each probable fall of the friction with speed, including no fall.
 
-    What a record leaves open of it, dry and viscous friction leave open.
+    What the record leaves open of the fall stays open in dry and viscous friction.
     """
     count = len(regression.names) + (not regression.lag.is_known)
     plain = [one[:, :count] for one in solved.columns]
@@ -160,7 +161,7 @@ def _scores(
     weight: _Array,
     variance: float,
 ) -> _Array:
-    """Return the information by the scatter of the strokes."""
+    """Return the information from the scatter of the strokes."""
     blocks = regression.blocks
     scores = np.stack(
         [
@@ -185,13 +186,13 @@ def _probable(logs: _Array) -> list[tuple[int, float]]:
 
 
 def _median(values: _Array, shares: _Array) -> float:
-    """Return the value that half of the shares lie below, which no improbable one moves."""
+    """Return the median weighted by the shares, which no improbable value moves."""
     order = np.argsort(values)
     return float(values[order[np.searchsorted(np.cumsum(shares[order]), 0.5 * np.sum(shares))]])
 
 
 class Posterior:
-    """What a solved regression leaves open: Gaussian but for the lag, which is integrated.
+    """Posterior of a solved regression: Gaussian except for the lag, which is integrated.
 
     The likelihood of the lag times its prior, and times the probability that F_c and F_v are above
     zero at that lag, is its posterior. At each lag all else is Gaussian.
@@ -251,7 +252,7 @@ class Posterior:
         return np.asarray(log - log.max())
 
     def timed(self, lags: LagProfile) -> "Posterior":
-        """Return the same with the lags of simulated stems, which tell a lag from F_v/k."""
+        """Return the posterior with the lags of simulated stems, which tell a lag from F_v/k."""
         other = copy.copy(self)
         other.log_likelihood = lags.log_likelihood
         other.probability = self.regression.lag.probability(lags.log_likelihood)
@@ -271,7 +272,7 @@ class Posterior:
         """Weigh the other order of two lags.
 
         A stem with the delay F_v/k behind a sensor or a volume with the lag τ looks, while it
-        slides, as one with the delay τ behind a lag F_v/k. Only their priors tell them apart.
+        slides, like one with the delay τ behind a lag F_v/k. Only their priors tell them apart.
         """
         values = self.regression.values(self.solved)
         spring, viscous = values.get("spring_constant", 0.0), values.get("viscous_friction", 0.0)
@@ -287,7 +288,7 @@ class Posterior:
     def _given_lag(self, gradient: _Array, choice: _Choice) -> tuple[float, float, float]:
         """Return a number, its slope over the lag's coefficient, and its deviation at that lag."""
         index, size = len(self.regression.names), choice.estimate.size
-        # A slip, which comes last, has no part in the number where only one of both has it.
+        # A slip comes last, and is left out of the number where only one of the two has it.
         gradient = np.pad(gradient[:size], (0, max(size - gradient.size, 0)))
         along = choice.covariance @ gradient
         value, variance = float(gradient @ choice.estimate), float(gradient @ along)
@@ -301,10 +302,10 @@ class Posterior:
         return value, slope, math.sqrt(max(factor * rest, np.finfo(float).tiny))
 
     def number(self, name: str, gradient: _Array, spread: float) -> Estimated:
-        """Return a number with its interval; `spread` is what no lag makes, but noise.
+        """Return a number with its interval; `spread` is its further deviation beside the lag.
 
-        The law of friction over speed is never quite that of the model, and rare imperfections make
-        up for the rest: dry and viscous friction leave all of them open.
+        The law of friction over speed is never quite that of the model, and rare imperfections
+        compensate for the rest: all of them stay open in dry and viscous friction.
         """
         rounding = self.regression.rounding(name)
         beside = self.regression.beside(name, self.lags)
@@ -347,10 +348,10 @@ class Posterior:
         )
 
     def _unsaid(self) -> float:
-        """Return the share of what the lag leaves open that comes from its prior, not from noise.
+        """Return the share of the lag's uncertainty that comes from its prior, not from noise.
 
-        Of a Gaussian the variance that is left times the information of the record is the other
-        part of 1.
+        For a Gaussian, the other part of the variance is the remaining variance times the
+        information of the record.
         """
         mean = float(self.probability @ self.lags)
         variance = float(self.probability @ (self.lags - mean) ** 2)

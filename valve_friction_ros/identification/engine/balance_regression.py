@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The force balance of the sliding stem: regressed, with all that the lag leaves open."""
+"""Regression of the force balance of the sliding stem, about a lag and with a Stribeck speed."""
 
 import math
 from collections.abc import Mapping
@@ -42,20 +42,20 @@ from valve_friction_ros.model.valve import Valve
 _Array = NDArray[np.float64]
 
 SECOND_ORDER = 0.025
-"""Time, s, whose square halved, times k, bounds what a lag does beyond a shift."""
+"""Time τ, s, for which k·τ²/2 bounds the effect of a lag beyond a shift."""
 
 _CONSERVATIVE = ("spring_constant", "spring_preload", "curvature", "cubic", "drift", "mass")
 """Terms of the force that are not friction."""
 
 _OUTLIER = 5.0
 _LEAST_MISFIT, _LEAST_WITHOUT_SPRING = 5e-3, 3e-4
-"""Deviations beyond which an average is left out, and the share of the friction to which no force
-balance is trusted further: less than that of a packing is taken for a stiffer spring, or a friction
-that changes; without a spring there is nothing to take it for."""
+"""Deviations beyond which an average is left out, and the share of the friction below which no
+force balance is trusted: less of a packing is mistaken for a stiffer spring, or a friction that
+changes; without a spring there is nothing to mistake it for."""
 
 _CHANCE, _OVERLAP, _LEAST_SHARED = 3.0, 3.0, 1e-9
-"""Deviations of chance that the share of the information must exceed which both halves have in
-common; averages that tell as much as one that does not overlap with others; a share of nothing."""
+"""Deviations of chance that the share of information common to both halves must exceed; overlapping
+averages that are worth one independent average; and a share that stands for zero."""
 
 _BINS = 12
 """Bins of the friction curve in each direction."""
@@ -70,12 +70,12 @@ class Solved(NamedTuple):
     Attributes
     ----------
     lag : float
-        Lag about which it is linear, s.
+        Lag about which it is linearised, s.
     estimate, covariance : ndarray of float, shapes (p,) and (p, p)
-        Coefficients of the scaled columns: those of `Regression.names`, one of the lag unless it is
-        known, and the slip force last, where friction falls with speed.
+        Coefficients of the scaled columns: those of `Regression.names`, the lag unless it is known,
+        and the slip force last, where friction falls with speed.
     residual, columns : list of ndarray of float, shapes (n,) and (n, p)
-        Force that is left, N, and regressors, of both halves of the samples.
+        Residual force, N, and regressors, of both halves of the samples.
     weight : ndarray of float, shape (n,)
         1 for each average that is used, else 0.
     precision, expected : ndarray of float, shape (p,)
@@ -100,7 +100,7 @@ class Solved(NamedTuple):
 
     @property
     def misfit(self) -> float:
-        """Deviation of the residual, N, by its median."""
+        """Deviation of the residual, N, from its median magnitude."""
         return float(np.median(np.abs(self.residual[0] + self.residual[1]))) / (
             2.0 * MEDIAN_MAGNITUDE
         )
@@ -276,7 +276,7 @@ class Regression:
 
     @property
     def least_variance(self) -> float:
-        """Variance of an average to which the balance is trusted, N²."""
+        """Least variance of an average, N²: the balance is trusted no further."""
         share = _LEAST_MISFIT if self.spring > 0.0 else _LEAST_WITHOUT_SPRING
         return float(share * self.friction) ** 2
 
@@ -295,7 +295,7 @@ class Regression:
         return dict(zip(self.names, (solved.estimate / solved.scale).tolist(), strict=False))
 
     def later(self, solved: Solved) -> float:
-        """Return the lag that the solution asks for, s."""
+        """Return the lag of the solution, s."""
         if self.lag.is_known:
             return 0.0
         index = len(self.names)
@@ -303,7 +303,7 @@ class Regression:
         return float(np.clip(solved.lag + change, -LARGEST_LAG, LARGEST_LAG))
 
     def descended(self, stribeck: float) -> tuple[Solved, float]:
-        """Follow lag and variance to where they agree, outliers left out; the variance too."""
+        """Iterate until lag and variance agree, without outliers; return the variance too."""
         lag, variance = 0.0, (3e-2 * self.friction) ** 2
         weight: _Array = np.ones(self.averages.taken.size)
         for _ in range(4):
@@ -316,7 +316,7 @@ class Regression:
         return solved._replace(weight=weight), variance
 
     def definition(self, name: str, solved: Solved) -> float:
-        """Deviation of a number by what it means where it is not one, as in `reported_numbers`.
+        """Deviation of a number due to its definition, as in `reported_numbers`.
 
         A friction that changes by ±a along the travel or during the record lies anywhere within
         ±a, and so does the slope of a curved spring, or a zero that drifts.
@@ -333,7 +333,7 @@ class Regression:
         return RECTANGLE * math.hypot(bow, stiffness * abs(self.middle), values["drift"])
 
     def beside(self, name: str, lags: _Array) -> _Array:
-        """Return what a number holds beside its coefficients at each lag: the work of the force."""
+        """Return the part of a number without coefficients at each lag: the work of the force."""
         if name != SLIDING:
             return np.zeros(lags.size)
         known = sum(
@@ -342,9 +342,9 @@ class Regression:
         return np.asarray(np.interp(lags, WORK_LAGS, self.work.by_lag) - known)
 
     def rounding(self, name: str) -> float:
-        """Return the deviation of a number by the converter of the force (`Work.rounding`).
+        """Return the deviation of a number due to the converter of the force (`Work.rounding`).
 
-        What is extrapolated from two speeds is off by twice that at one.
+        A number that is extrapolated from two speeds is off by twice as much as at one speed.
         """
         off = self.work.rounding
         if name in (SLIDING, "spring_preload"):
@@ -356,9 +356,9 @@ class Regression:
         return 0.0
 
     def beyond_shift(self, lag: float) -> float:
-        """Return the deviation of the work, N, by what a lag is beside a shift of one signal.
+        """Return the deviation of the work, N, due to the effect of a lag beyond a shift.
 
-        A volume or a filter of the time τ also takes ω²·τ²/2 of a swing. Half of the bend of the
+        A volume or a filter of the time τ also takes ω²·τ²/2 of a swing. Half the curvature of the
         work over the lag, ∫F″·ẋ·dt, is that share of it.
         """
         if self.lag.is_known:
@@ -371,7 +371,7 @@ class Regression:
         """Return how each number depends on the coefficients.
 
         The sliding friction is the work of the measured force less what spring, preload and mass
-        keep, over the distance: no law of friction and no speed takes part.
+        keep, per distance: it involves no law of friction and no speed.
         """
         axes = np.eye(solved.scale.size)
         at = {name: axes[index] for index, name in enumerate(self.names)}
@@ -392,7 +392,7 @@ class Regression:
     def _exponent(self, stribeck: float, solved: Solved) -> _Array:
         """Return how d ln F / d ln v at the sliding speed depends on the coefficients.
 
-        The friction F itself is taken as known: it is so to a few per cent, the slope is not.
+        The friction F itself is taken as known: it is known to a few per cent, the slope is not.
         """
         speed, values = self.sliding_speed, self.values(solved)
         slope = np.zeros(solved.scale.size)
@@ -405,7 +405,7 @@ class Regression:
         return np.asarray(slope / max(friction, 0.1 * self.friction))
 
     def bins(self, solved: Solved) -> tuple[_Array, _Array, _Array]:
-        """Return friction over speed: what is left of the force without spring and preload."""
+        """Return friction over speed: the force without spring and preload."""
         averages, taken = self.averages, self.averages.taken
         keep = np.array([name in _CONSERVATIVE for name in self.names])
         rest = [
@@ -443,10 +443,10 @@ def _at(signal: "_Array | float", taken: NDArray[np.intp]) -> "_Array | float":
 
 
 def _shared(own: _Array, cross: _Array, right: _Array, independent: float) -> tuple[_Array, _Array]:
-    """Return the information that both halves share, and the right-hand side that goes with it.
+    """Return the information that both halves share, and the matching right-hand side.
 
-    Along each direction the halves agree in a share s of what each of them holds, which n averages
-    know to (1 − s)/√n. What chance may have made of noise says nothing: the prior is left alone.
+    Along each direction the halves share s of the information of each, which n averages determine
+    to (1 − s)/√n. A share that may be chance is dropped: the prior alone remains.
     """
     values, vectors = np.linalg.eigh(own)
     root = np.sqrt(np.maximum(values, max(1e-13 * float(values[-1]), np.finfo(float).tiny)))

@@ -39,24 +39,24 @@ from valve_friction_ros.identification.engine.imperfections import (
 from valve_friction_ros.identification.engine.weights import reading_weights
 
 ABSENT = dict.fromkeys(IMPERFECTIONS, 0.0)
-"""Nothing imperfect; the mass has to be set."""
+"""No imperfections; the mass has to be set."""
 
 _LARGEST_COARSENESS = 10.0
-"""Of the imperfections but the timing, whose changes are wide already."""
+"""Largest coarseness of the imperfections except timing: their steps are wide already."""
 
 _CONSTANT, _FALLING = (1, 30), (4, 360)
-"""Times of a step that takes a short cut and of one with an event, over that of a short cut under
-constant friction; where friction falls with speed, chords follow it."""
+"""Cost of a step that takes a short cut and of one with an event, over a short cut under constant
+friction; where friction falls with speed, chords follow it."""
 
 SWINGING = 2e-3
 _OVER_SWING = 1e-3
-"""A delay F_v/k, s, below which a stem may swing, and the change by which to differentiate there:
-through the swings a small one means nothing."""
+"""Delay F_v/k, s, below which a stem may swing, and the step of differentiation there: across the
+swings a small step means nothing."""
 
 _STEP = 1e-5
-"""Change of a main coordinate over its size by which to differentiate.
+"""Step of differentiation by a main coordinate, over its size.
 
-The main coordinates nearly make up for one another, so their derivatives must be good to four
+The main coordinates nearly compensate one another, so their derivatives must be good to four
 digits and more; the simulation is exact, so the step may be small."""
 
 
@@ -85,11 +85,11 @@ class BroadModel:
     record : FittedRecord
         The record.
     usual_spring : float
-        Spring constant, N/m, by which noise of the force counts as noise of the stem. It is the
-        same throughout a fit, so that no fit gains by a spring that makes the noise count less.
+        Spring constant, N/m, that converts noise of the force to noise of the stem. It is the same
+        throughout a fit, so that no fit gains by a spring that lowers the noise.
     coarseness : float
-        Factor of the changes by which to differentiate. Far from the end of a fit, wide ones see
-        over the kinks at which a stem stops or breaks away; with 1 the derivatives are exact.
+        Factor of the steps of differentiation. Far from the end of a fit, wide steps bridge the
+        kinks at which a stem stops or breaks away; with 1 the derivatives are exact.
     """
 
     record: FittedRecord
@@ -108,7 +108,7 @@ class BroadModel:
         return float(np.sum(shares)) / self.usual_spring**2
 
     def course(self, force: NDArray[np.float64]) -> Course:
-        """Return what drives the stem, and the slow terms along it."""
+        """Return the drive of the stem, and the slow terms along it."""
         record, slow = self.record, self.record.slow
         return Course(
             record.period,
@@ -125,13 +125,13 @@ class BroadModel:
 
     @cached_property
     def halves(self) -> tuple[Course, Course]:
-        """The same driven by each half of the samples of the pressure."""
+        """Course driven by each half of the samples of the pressure."""
         even, odd = self.record.halves
         return self.course(even), self.course(odd)
 
     @cached_property
     def _room(self) -> NDArray[np.float64]:
-        """Room for the derivatives of one simulation by all coordinates."""
+        """Work space for the derivatives of one simulation by all coordinates."""
         return np.empty(2 * self.record.force.size * len(Place._fields))
 
     def simulate(self, at: Coordinates) -> Simulated:
@@ -155,7 +155,7 @@ class BroadModel:
         return short_cut * force.size + event * stepped
 
     def readings(self, at: Coordinates) -> NDArray[np.float64]:
-        """Return what the stem's sensor would read, m, a value a cell, by each half: (2, c)."""
+        """Return the readings of the stem's sensor, m, one per cell, by each half: (2, c)."""
         place = Place(**at)
         readings = np.empty((2, self.record.position.size))
         for course, row in zip(self.halves, readings, strict=True):
@@ -167,9 +167,9 @@ class BroadModel:
     ) -> NDArray[np.float64]:
         """Differentiate the `readings` by the straight coordinates `names`, shape (2, p, c).
 
-        One simulation carries the exact derivatives along (`read_slopes`). Differences take their
-        place where the coarseness asks for wide ones, and by a slip force or a dead zone that are
-        not there yet: what these do begins with their square.
+        One simulation carries the exact derivatives along (`read_slopes`). Differences replace them
+        where the coarseness asks for wide steps, and for a slip force or a dead zone that is still
+        zero: their effect begins with the square.
         """
         centre, differed = straight(at, names), names
         slopes: NDArray[np.float64] = np.empty((2, len(names), self.record.position.size))
@@ -198,7 +198,7 @@ class BroadModel:
         return slopes.transpose(0, 2, 1)
 
     def step(self, at: Coordinates, name: str) -> float:
-        """Return the change of a straight coordinate by which to differentiate."""
+        """Return the step of differentiation by a straight coordinate."""
         spring = max(at["spring_constant"], 1e-6)
         dry = max(abs(at["coulomb_friction"]), 1e-6) / spring
         if name == "viscous_friction" and at[name] / spring < SWINGING:

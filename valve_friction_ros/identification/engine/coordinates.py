@@ -9,13 +9,13 @@
 
 """Coordinates in which the stem of a sliding valve is linear.
 
-Sliding, the stem stands at
+While it slides, the stem is at
 
     x = F/k − F_0/k ∓ F_c/k − (F_v/k)·ẋ .
 
 In 1/k, F_0/k, F_c/k and F_v/k this is linear, so the linear model of a fit holds far along the
-valleys in which friction, spring and delay make up for one another. Everything but the fit itself
-speaks in the physical coordinates.
+valleys in which friction, spring and delay compensate one another. Everything except the fit
+itself uses the physical coordinates.
 """
 
 from collections.abc import Mapping

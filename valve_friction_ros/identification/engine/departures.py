@@ -51,14 +51,13 @@ from valve_friction_ros.signals import runs_of
 _Array = NDArray[np.float64]
 
 _FEWEST, _FEWEST_ALONE = 4, 6
-"""Departures that an estimate needs, a third of each direction, with a known spring and alone."""
+"""Departures that an estimate needs, a third in each direction: with a known spring, without."""
 
 _REST, _REST_SAMPLES = 0.1, 8
 """Shortest rest before a departure: s and samples."""
 
 _MOVES, _SHARE_OF_TOP = 6.0, 0.01
-"""The stem moves above so many deviations of the noise of its speed, and above that share of its
-top speed."""
+"""Speed above which the stem moves, in deviations of its noise and as a share of its top speed."""
 
 _FAR = 12.0
 _SHARE_OF_RANGE = 0.004
@@ -68,24 +67,24 @@ _ONSET = 0.15
 """Share of the first peak of the speed at which the stem has left."""
 
 _LINE, _LINE_SAMPLES = 0.05, 6
-"""Time, s, and samples over which the force before a departure is fitted by a line, at least."""
+"""Least time, s, and samples over which a line is fitted to the force before a departure."""
 
 _MODEL = 0.02
-"""Standard deviation of a departure's force as a share of it: no rest is like the other."""
+"""Standard deviation of a departure's force as a share of it: no two rests are alike."""
 
 _SLIP, _SURELY = 0.08, 3.0
-"""The stem slips if the force against friction falls by that share of F_s, and by so many standard
-deviations of a departure's force."""
+"""The stem slips if the force against friction falls by this share of F_s, and by this many
+standard deviations of a departure's force."""
 
 _LEAST_SHARE = 0.015
 """Least half width over the value."""
 
 _TOP = 0.999
-"""Quantile of the speed that is the top."""
+"""Quantile of the speed that is taken as the top speed."""
 
 _EARLY, _BETWEEN, _WHEN = 0.85, 0.4, 0.3
-"""Averages show a motion that many of their own lengths early, and it begins between two samples;
-both are known to that share of a length and a sample."""
+"""Lead with which averages show a motion, in averaging lengths; its beginning between two samples,
+in samples; and the uncertainty of both, as a share of a length and a sample."""
 
 _FEWEST_OF_LINE = 3
 _OUTLIER = 4.0
@@ -101,7 +100,7 @@ _ROUNDS, _L1_ROUNDS = 6, 20
 
 
 class Departed(NamedTuple):
-    """F_s by the departures of the stem, and how many they are."""
+    """F_s from the departures of the stem, and their number."""
 
     static_friction: Estimated
     departures: int
@@ -111,9 +110,9 @@ class _Departures(NamedTuple):
     """The departures of a record, shape (n,) each.
 
     `side` is the sign of the motion, `force` (N) and `rate` (N/s) are those of the drive,
-    `position` is that of the rest (m), `error` (N) the standard deviation of a force, and `fall`
-    (N) by how much the force against friction falls until the stem rests again. By `drift` (N) the
-    zero of the force may drift from the middle of the record to its ends.
+    `position` (m) is the position of the rest, `error` (N) the standard deviation of a force, and
+    `fall` (N) the fall of the force against friction until the stem rests again. `drift` (N) is the
+    possible drift of the force's zero from the middle of the record to its ends.
     """
 
     side: _Array
@@ -142,7 +141,7 @@ def static_friction(
     numbers : mapping of str to Estimated
         Spring constant and preload, as far as they are known.
     lag : LagPrior
-        What is known of the timing.
+        Prior of the lag.
 
     Returns
     -------
@@ -203,7 +202,7 @@ def _departures(
 
 
 def _averaged_over(position: _Array, noise: float) -> int:
-    """Return the samples to average over, twice, so that a jump of the stem stands out."""
+    """Return how many samples to average over, twice, so that a jump of the stem stands out."""
     length = 1
     while length < _REST_SAMPLES:
         fastest = float(np.quantile(np.abs(np.gradient(averaged_twice(position, length))), 0.995))
@@ -293,8 +292,9 @@ def _estimated(
 ) -> tuple[Estimated | None, dict[str, tuple[float, float]]]:
     """Return F_s, and the spring with its standard errors.
 
-    What a lag of the record takes from F_s is added to the interval: a packing that is loaded
-    quickly leaves earlier, as if there were a lag. So is half the scatter of the departures.
+    The part of F_s that a lag of the record explains is added to the interval: a packing that is
+    loaded quickly breaks away earlier, as if there were a lag. So is half the scatter of the
+    departures.
     """
     side, rate, size = found.side, found.rate, found.side.size
     middle, half = float(np.mean(found.position)), max(0.5 * float(np.ptp(found.position)), 1e-9)

@@ -28,14 +28,14 @@ _AT_STEP = 1e-6
 
 
 class Course(NamedTuple):
-    """What drives the stem at each step of the simulation, and the slow terms there.
+    """Drive of the stem at each step of the simulation, and the slow terms there.
 
     Attributes
     ----------
     period : float
         Step, s.
     travel : float
-        Of the valve, m.
+        Travel of the valve, m.
     stroke, span : float
         Range of the measured positions, m, and of the sensor of the force, N.
     force : ndarray of float, shape (g,)
@@ -45,7 +45,7 @@ class Course(NamedTuple):
     slowness : ndarray of float, shape (g,)
         Share of the friction at rest that is left at the measured speed.
     anew, leaving : ndarray of float, shape (g,)
-        Where the stem is set anew, m, nan elsewhere; its velocity there, m/s.
+        Position to which the stem is reset, m, nan elsewhere; its velocity there, m/s.
     """
 
     period: float
@@ -107,18 +107,18 @@ class Place(NamedTuple):
     _SLIP,
     _STRIBECK,
 ) = range(len(Place._fields))
-"""Numbers of the coordinates, by which kernels know them."""
+"""Indices of the coordinates in kernels."""
 
 _OF_FRICTION = (_COULOMB, _ALONG_TRAVEL, _IN_RECORD, _AT_LOW_SPEED)
-"""Those that grade the friction, and not the force."""
+"""Coordinates that grade the friction, and not the force."""
 
 
 @compiled
 def _lag(signal: NDArray[np.float64], lag: float, period: float) -> None:
     """Pass a signal, linear between its samples, through a first-order lag.
 
-    Before its first sample the signal is taken to have gone on as it begins: a record may begin in
-    the midst of a move.
+    Before its first sample the signal is extrapolated by its first slope: a record may begin in the
+    middle of a move.
     """
     decay = math.exp(-period / lag)
     newest = 1.0 - lag * (1.0 - decay) / period
@@ -136,7 +136,7 @@ def _lag(signal: NDArray[np.float64], lag: float, period: float) -> None:
 def _lag_slope(
     signal: NDArray[np.float64], lag: float, period: float, slope: NDArray[np.float64]
 ) -> None:
-    """Differentiate what `_lag` makes of a signal by the lag; upwards where there is none."""
+    """Differentiate the output of `_lag` by the lag; towards larger lags where it is zero."""
     decay = math.exp(-period / lag) if lag > _LEAST_LAG else 0.0
     newest = 1.0 - lag * (1.0 - decay) / period
     slower = decay * period / (lag * lag) if lag > _LEAST_LAG else 0.0
@@ -154,7 +154,7 @@ def _lag_slope(
 
 @compiled
 def _lead_slope(signal: NDArray[np.float64], period: float, slope: NDArray[np.float64]) -> None:
-    """Differentiate a signal with a small lead by its lag: less its slope."""
+    """Differentiate a signal with a small lead by its lag: minus its slope."""
     last = signal.size - 1
     for step in range(signal.size):
         before, after = max(step - 1, 0), min(step + 1, last)
@@ -183,10 +183,10 @@ def _constants(at: Place, travel: float) -> NDArray[np.float64]:
 
 @compiled
 def _shares(course: Course, at: Place) -> NDArray[np.float64]:
-    """Differentiate, by each coordinate of `Place`, the shares of the signals in what drives.
+    """Differentiate the shares of the signals in force and friction by each coordinate of `Place`.
 
-    Those of the force are one, the two polynomials of the place, the age and the slope by the lag;
-    those of the graded friction the place, the age and the slowness.
+    The signals of the force are one, the two polynomials of the place, the age and the slope by the
+    lag; those of the graded friction are the place, the age and the slowness.
     """
     table = np.zeros((_STRIBECK + 1, 8))
     stroke, dry = course.stroke, at.coulomb_friction
@@ -203,7 +203,7 @@ def _shares(course: Course, at: Place) -> NDArray[np.float64]:
 def _tangent(
     course: Course, at: Place, coordinates: NDArray[np.int64], room: NDArray[np.float64]
 ) -> Tangent:
-    """Differentiate what drives the stem by some coordinates, and where it begins."""
+    """Differentiate the drive of the stem and its start by some coordinates."""
     tangent = no_tangent(coordinates.size, room[0], room[1])
     constants, shares = _constants(at, course.travel), _shares(course, at)
     signals = np.empty((shares.shape[1], course.force.size))
@@ -248,7 +248,7 @@ def drive_stem(
 ) -> int:
     """Fill in the force less the preload (N), the positions (m) and the velocities (m/s).
 
-    Return what `run_stem` does, which carries a `tangent` along.
+    Return the result of `run_stem`, which carries a `tangent` along.
     """
     stiff = at.spring_constant * course.stroke
     curved, cubic = at.curvature * stiff, at.cubic * stiff
@@ -314,7 +314,7 @@ def _held(at: Place, force: float, position: float, velocity: float) -> tuple[fl
 def read_stem(
     course: Course, at: Place, cells: NDArray[np.float64], readings: NDArray[np.float64]
 ) -> None:
-    """Fill in what the stem's sensor reads, m, at places between the steps.
+    """Fill in the readings of the stem's sensor, m, at places between the steps.
 
     A bristle that is bent by δ at full friction adds δ·F/F_s while the stem rests, ±δ while it
     slides. A slow sensor is a first-order lag, a late clock a shift.
@@ -367,7 +367,7 @@ def _bend(
 
 @compiled
 def _mixed(turned: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Return which columns have several parts."""
+    """Return which columns have several entries other than zero."""
     found = np.empty(turned.shape[1], dtype=np.bool_)
     for one in range(found.size):
         parts = 0
@@ -387,7 +387,7 @@ def _read_cells(
     turned: NDArray[np.float64],
     slopes: NDArray[np.float64],
 ) -> None:
-    """Interpolate derivatives at places between the steps, and turn them to other coordinates."""
+    """Interpolate derivatives between the steps, and convert them to other coordinates."""
     size = coordinates.size
     read, is_mixed = np.empty(size), _mixed(turned)
     for cell in range(cells.size):
@@ -421,22 +421,22 @@ def read_slopes(
     room: NDArray[np.float64],
     slopes: NDArray[np.float64],
 ) -> None:
-    """Differentiate what `read_stem` fills in; one simulation carries all derivatives along.
+    """Differentiate the readings of `read_stem`; one simulation carries all derivatives along.
 
     Parameters
     ----------
     course : Course
-        What drives the stem.
+        Drive of the stem.
     at : Place
         The coordinates.
     coordinates : ndarray of int, shape (p,)
-        By which to differentiate, numbered as in `Place`.
+        Coordinates by which to differentiate, numbered as in `Place`.
     turned : ndarray of float, shape (p, p)
-        Derivatives of those by others (column), which the result is by.
+        Derivatives of these coordinates by those of the result (columns).
     cells : ndarray of float, shape (c,)
-        Where the sensor is read, in steps.
+        Times at which the sensor is read, in steps.
     room : ndarray of float, shape (2, g, p)
-        Room to work in. New one at each call would cost more than the work.
+        Work space. Allocating it at each call would cost more than the work.
     slopes : ndarray of float, shape (c, p)
         The result, m over the unit of a coordinate.
     """

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The intervals that the method "plant" would report of a record of a known valve."""
+"""Intervals that the method "plant" would report for a record of a known valve."""
 
 import math
 from collections.abc import Mapping
@@ -44,11 +44,11 @@ def expected_half_widths(
     start: float,
     with_competitors: bool = True,
 ) -> Mapping[str, float]:
-    """Return half the widths of the 95 % intervals that a simulated record will get.
+    """Return the half widths of the 95 % intervals to expect from a simulated record.
 
     They are those of the posterior (HᵀW²H/κ + Λ)⁻¹ at the simulated valve itself: the sensitivities
     H of the exact simulation, the noise W of both sensors, and the priors Λ of the imperfections
-    with which `identify_plant` fits, lags of the signals among them. No fit searches.
+    with which `identify_plant` fits, including lags of the signals. No search is run.
 
     Parameters
     ----------
@@ -57,14 +57,14 @@ def expected_half_widths(
     valve : Valve
         Geometry.
     parameters : KarnoppParameters
-        What it was simulated with.
+        Parameters of the simulation.
     settings : IdentificationSettings, optional
-        Those of the identification to come.
+        Settings of the identification.
     start : float
         Simulated position at the first sample, m.
     with_competitors : bool
-        Whether the models count that explain the record by a lag in place of viscous friction; it
-        takes some ten times as long, and matters to F_v above all.
+        Whether to include models that explain the record by a lag in place of viscous friction;
+        that takes some ten times as long, and matters most for F_v.
 
     Raises
     ------

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""A stamped record as the fit takes it: a force to simulate with, a stem to compare with."""
+"""A stamped record prepared for the fit: a force to simulate with, a stem to compare with."""
 
 import math
 from dataclasses import dataclass, field, replace
@@ -44,7 +44,7 @@ _MOST_SAMPLES = 64_000
 _NOISELESS = 1e-6
 """Least noise over the range of a signal that was measured.
 
-A drive with less was simulated, and is taken as it is; a stem is taken to have as much."""
+A drive with less was simulated, and is used unchanged; a stem is taken to have at least as much."""
 
 _SAMPLES_A_WINDOW = 32
 _SLOW = 0.1
@@ -54,15 +54,15 @@ LOW_SPEED = 3e-3
 """Speed, m/s, below which packings are known to hold faster: the v_s published for graphite."""
 
 _CALM = 1e-3
-"""Noise of the speed, over `LOW_SPEED`, for which it is averaged longer: through a friction that
+"""Noise of the speed, over `LOW_SPEED`, to which longer averages reduce it: through a friction that
 falls with speed, the simulated stem would follow the noise of the measured one."""
 
 _CALM_PARTS = 20
-"""Of the record; it is averaged over one of them at most."""
+"""Parts of the record; the speed is averaged over one of them at most."""
 
 _GAP_PERIODS = 10
 _GAP_TIME = 0.05
-"""Longer pauses than so many periods, and than this, s, are gaps: what is between them is lost."""
+"""Pauses longer than this many periods, and this time, s, are gaps: the motion there is lost."""
 
 _LINE_TIME = 0.05
 _LINE_SAMPLES = 4
@@ -70,12 +70,12 @@ _SURELY = 5.0
 """Standard errors by which a stem must move at the start, to be set moving."""
 
 _MEMORY = 2.5
-"""Lengths of the smoothing window over those through which its error stays the same."""
+"""Length of the smoothing window over the length through which its error stays the same."""
 
 _FEWEST = 100
 _STILL = 0.01
 _STILL_NOISE = 4.0
-"""The averaged stem rests below this share of its top speed, or so many deviations of its noise."""
+"""Speed below which the averaged stem rests: share of its top speed, or deviations of its noise."""
 
 _REST_MEAN = 0.1
 _REST_MARGIN = 0.15
@@ -89,13 +89,13 @@ class SlowView:
     Attributes
     ----------
     place : ndarray of float
-        Position, −1 at the lowest and 1 at the highest place that was measured.
+        Position, −1 at the lowest and 1 at the highest measured position.
     age : ndarray of float
         Time, −1 at the beginning and 1 at the end.
     speed : ndarray of float
         Speed, m/s.
     slowness : ndarray of float
-        exp(−speed/`LOW_SPEED`), the speed averaged until its noise hardly counts.
+        exp(−speed/`LOW_SPEED`), the speed averaged until its noise hardly matters.
     force : ndarray of float
         Actuator force, N, averaged like the stem.
     lowest, highest : float
@@ -119,7 +119,7 @@ class SlowView:
 
 @dataclass(frozen=True, eq=False)
 class FittedRecord:
-    """What the fit needs of a record.
+    """A record prepared for the fit.
 
     Attributes
     ----------
@@ -128,16 +128,16 @@ class FittedRecord:
     force : ndarray of float, shape (g,)
         Smoothed actuator force at each step, N.
     halves : ndarray of float, shape (2, g)
-        The same from the even samples alone and from the odd ones: their noise is independent.
+        The same from the even samples alone and from the odd samples: their noise is independent.
     anew, leaving : ndarray of float, shape (g,)
-        Where the stem is set anew after a gap, m, nan elsewhere; and its velocity there and at the
-        start, m/s.
+        Position to which the stem is reset after a gap, m, nan elsewhere; and its velocity there
+        and at the start, m/s.
     cells : ndarray of float, shape (c,)
         Mean stamp of the positions between two steps, in steps.
     position : ndarray of float, shape (c,)
-        The means that were measured, m.
+        Mean measured position in each cell, m.
     time : ndarray of float, shape (c,)
-        The mean time of each cell, s.
+        Mean time of each cell, s.
     samples : ndarray of float, shape (c,)
         Samples in each cell.
     noise : float
@@ -149,7 +149,7 @@ class FittedRecord:
     slow : SlowView
         Slow terms.
     travel : float
-        Of the valve, m.
+        Travel of the valve, m.
     lost : float
         Time in gaps, s.
     start : float
@@ -199,9 +199,9 @@ class _Smoothed(NamedTuple):
     whole : ndarray of float, shape (g,)
         From all samples.
     halves : ndarray of float, shape (2, g)
-        From the even samples and from the odd ones.
+        From the even samples and from the odd samples.
     variance : ndarray of float, shape (g,)
-        Of the noise of `whole`.
+        Variance of the noise of `whole`.
     window : int
         Steps of the grid over which it is smoothed.
     """
@@ -212,14 +212,14 @@ class _Smoothed(NamedTuple):
     window: int
 
     def at(self, grid: NDArray[np.float64], steps: NDArray[np.float64]) -> "_Smoothed":
-        """Return it at other steps."""
+        """Return the signal at other steps."""
         whole, even, odd, variance = (
             np.interp(steps, grid, row) for row in (self.whole, *self.halves, self.variance)
         )
         return _Smoothed(whole, np.stack([even, odd]), variance, self.window)
 
     def averaged(self, length: int) -> "_Smoothed":
-        """Return its means over `length` steps about each; their noise is not taken as less."""
+        """Return means over `length` steps about each step; their variance stays as it is."""
         whole, even, odd = (_averaged(row, length) for row in (self.whole, *self.halves))
         return _Smoothed(whole, np.stack([even, odd]), self.variance, self.window)
 
@@ -236,7 +236,7 @@ def _averaged(signal: NDArray[np.float64], length: int) -> NDArray[np.float64]:
 def _noise_on_grid(signal: StampedSignal, grid: NDArray[np.float64], noise: float) -> float:
     """Return the deviation of white noise that averages as the interpolated noise does.
 
-    A sample that counts w steps adds w²·s² to the variance of a sum of steps.
+    A sample with the weight of w steps adds w²·s² to the variance of a sum of steps.
     """
     after = np.clip(np.searchsorted(signal.time, grid, side="right"), 1, signal.time.size - 1)
     share = (grid - signal.time[after - 1]) / (signal.time[after] - signal.time[after - 1])
@@ -313,7 +313,7 @@ def _set_anew(
 def fitted_record(record: StampedRecord, valve: Valve) -> FittedRecord:
     """Smooth the pressure on a uniform grid, and leave the stem at its own stamps.
 
-    The pressure is smooth but for its corners, so it may be interpolated; the positions may not.
+    The pressure is smooth except at its corners, so it may be interpolated; the positions may not.
     The simulated stem is read where the stem was stamped, so jitter, drops and rates cost no more
     than the samples that they take. The positions of one step are averaged, which loses nothing.
 
@@ -417,11 +417,11 @@ def _slow_view(
 
 
 def set_anew_at_rests(record: FittedRecord) -> FittedRecord:
-    """Return the record with the stem set to its measured place at the end of each rest.
+    """Return the record with the stem reset to its measured position at the end of each rest.
 
-    A resting stem has forgotten all but its place, so each move stands for itself: a single jump
-    that is simulated at the wrong time then spoils no other. What a place is off by noise is the
-    price; the end of a fit does without.
+    A resting stem has forgotten all but its position, so each move is independent: a single jump
+    that is simulated at the wrong time then spoils no other. The price is the noise of that
+    position; the end of a fit does without.
     """
     positions = np.interp(
         np.arange(record.force.size) * record.period, record.time, record.position

@@ -64,48 +64,48 @@ _Array = NDArray[np.float64]
 
 _AVERAGING_TIMES = (0.03, 0.06, 0.12, 0.24, 0.48, 0.96)
 _SHORT_AVERAGING_TIMES = (0.015, 0.008, 0.004)
-"""Times, s, over which the signals are averaged, twice; the short ones where no longer ones leave
-samples of a stem that slides, as in the jumps of stick-slip."""
+"""Times, s, over which the signals are averaged, twice; the short times apply where no longer time
+leaves samples of a stem that slides, as in the jumps of stick-slip."""
 
 _MOST_CURVES = 4
 _FEWEST_PERIODS = 2.9
-"""Averaging times that are used, and sampling periods in each."""
+"""Most averaging times that are used, and fewest sampling periods in each."""
 
 _LEAST_HALF_WIDTH, _LEAST_OF_MACHINE, _LEAST_ALONE = 0.015, 0.04, 0.06
-"""Least half width over the value of any number, as no force balance of a plant is the whole truth
-to more than that; the same without a spring, where the reversals that are left out hold more of the
-friction; and where no second averaging time confirms it."""
+"""Least half width over the value of any number, as no force balance of a plant is more accurate;
+the same without a spring, where the reversals that are left out hold more of the friction; and
+where no second averaging time confirms it."""
 
 _CONFIRMED = 2
 """Averaging times that confirm each other."""
 
 _AS_WELL = 1.1
-"""Half width over the least up to which an averaging time knows a number as well."""
+"""Half width over the least up to which an averaging time determines a number as well."""
 
 _NEARLY = 5.0
 _SCATTERS = 2.0
-"""Half width over the least up to which an averaging time counts, and deviations of their scatter
-that are added to the interval."""
+"""Half width over the least up to which an averaging time is included, and deviations of their
+scatter that are added to the interval."""
 
 _CONTRADICTED, _NEITHER = 0.02, 0.1
-"""Difference of the lags, s, from which on two averaging times contradict each other: what looks
-like a lag may then be none, as in a packing that creeps before it slides. And how likely each lag
-is at least then, over the likeliest."""
+"""Difference of the lags, s, above which two averaging times contradict each other: what looks like
+a lag may then be none, as in a packing that creeps before it slides. And the least likelihood of
+each lag then, over the likeliest."""
 
 _PULL = 1.0 / 3.0
 """Share of the difference from the force balance that widens the interval of a simulated number:
-what only the transients know is known no better."""
+a number from the transients alone is known no better."""
 
 _LONGEST = 0.1
 """Longest time, s, over which the signals are averaged: a stem that hunts rests for seconds."""
 
 _FEWEST_SAMPLES = 20
 _COEFFICIENTS = 3
-"""Friction, spring and preload, which more strokes than that determine with their scatter."""
+"""Friction, spring and preload: more strokes than that determine them and their scatter."""
 
 _PIECES = 8
-"""Pieces, at least, into which the strokes are cut where there are fewer; what a stem has of
-kinetic energy between two pieces of a stroke is part of their scatter."""
+"""Least number of pieces, into which strokes are cut where there are fewer; the kinetic energy of
+the stem between two pieces of a stroke is part of their scatter."""
 
 _ROUNDS = 5
 """Rounds in which regression and scatter come to agree."""
@@ -133,26 +133,26 @@ class FrictionCurve:
     Attributes
     ----------
     averaging_time : float
-        Over which force and stem are averaged, twice, s.
+        Time over which force and stem are averaged, twice, s.
     speed, friction, standard_error : ndarray of float, shape (b,)
-        Mean velocity of each bin (m/s, negative downward), mean friction there (N), and how far
-        chance moves it (N). No law is assumed but the spring.
+        Mean velocity of each bin (m/s, negative downward), mean friction there (N), and its
+        standard error (N). No law is assumed except that of the spring.
     numbers : mapping of str to Estimated
         Parameters and sliding friction, SI units.
     sliding_speed : float
-        Mean speed over the distance, m/s, at which the sliding friction is.
+        Mean speed over the distance, m/s, at which the sliding friction holds.
     stribeck_velocity : float
         v_s, m/s; 0 where friction does not surely fall with speed.
     lag : float
         Most probable time by which the stem is seen late, s.
     inflation : float
-        Of the residual over what noise explains.
+        Inflation of the residual over what noise explains.
     fit, misfit : float
-        Share of the force that the balance reproduces, and deviation of what it leaves, N.
+        Share of the force that the balance reproduces, and deviation of the residual, N.
     correlation : Correlation or None
-        How the errors of the numbers go together.
+        Correlation of the errors of the numbers.
     posterior : Posterior or None
-        What the regression leaves open; None of whole strokes.
+        Posterior of the regression; None for whole strokes.
     """
 
     averaging_time: float
@@ -171,7 +171,7 @@ class FrictionCurve:
 
     @property
     def law(self) -> dict[str, float]:
-        """Coefficients of the likeliest law at the likeliest lag, SI units; none of strokes."""
+        """Coefficients of the likeliest law at the likeliest lag, SI units; empty for strokes."""
         if self.posterior is None:
             return {}
         solved = self.posterior.solved
@@ -181,7 +181,7 @@ class FrictionCurve:
         return values
 
     def timed(self, lags: LagProfile) -> "FrictionCurve":
-        """Return the same with each lag as likely as simulated stems tell it."""
+        """Return the curve with the likelihood of each lag from simulated stems."""
         if self.posterior is None or self.posterior.regression.lag.is_known:
             return self
         return _curve_of(self.posterior.timed(lags))
@@ -202,7 +202,7 @@ def friction_curves(
     valve : Valve
         Geometry.
     lag : LagPrior, optional
-        What is known of the timing.
+        Prior of the lag.
     fixed : mapping of str to float, optional
         Known parameters; a spring constant of 0 for a machine without a spring.
 
@@ -210,8 +210,8 @@ def friction_curves(
     -------
     list of FrictionCurve
         The shortest averaging time first. Where the stem nowhere surely slides both ways, or whole
-        strokes exclude what a single averaging time says, that of these alone, with the sliding
-        friction (`_by_strokes`); empty with too few.
+        strokes exclude the result of a single averaging time, only the curve of the strokes, with
+        the sliding friction (`_by_strokes`); empty with too few strokes.
     """
     lag, fixed = lag or LagPrior(), fixed or {}
     force, stem = force_and_stem(record, valve)
@@ -227,7 +227,7 @@ def friction_curves(
                 found.append(posterior_of(Regression(averages, work, valve, lag, fixed)))
         if found:
             break
-    # A lag at the end of what is possible makes up for something else.
+    # A lag at the limit of what is possible compensates for something else.
     found = [one for one in found if abs(one.regression.later(one.solved)) < LARGEST_LAG]
     likelihoods = [one.log_likelihood for one in found if one.log_likelihood is not None]
     likelihoods = _believed(likelihoods, [one.regression.later(one.solved) for one in found])
@@ -241,7 +241,7 @@ def friction_curves(
 
 
 def _curve_of(posterior: Posterior) -> FrictionCurve:
-    """Say what a regression leaves open."""
+    """Return the friction curve of a posterior."""
     regression, solved = posterior.regression, posterior.solved
     averages, numbers = regression.averages, {}
     gradients = {
@@ -277,7 +277,7 @@ def _curve_of(posterior: Posterior) -> FrictionCurve:
 def _checked_by_strokes(
     curves: list[FrictionCurve], strokes: FrictionCurve | None
 ) -> list[FrictionCurve]:
-    """Return what an averaging time says that no other confirms, or whole strokes against it."""
+    """Return the curve of a single averaging time, or whole strokes where they contradict it."""
     if strokes is None or (curves and _agree(curves[0].numbers[SLIDING], strokes.numbers[SLIDING])):
         return curves
     return [strokes]
@@ -290,7 +290,7 @@ def _by_strokes(
 
     Between two reversals the stem has no kinetic energy to give: that mean is the force of the
     spring at the middle and the mean friction, however the stem moved. There is a bin for each
-    stroke, and no law of friction. None where there are too few for their scatter to be seen.
+    stroke, and no law of friction. None with too few strokes to show their scatter.
     """
     between = max(force.time[0], stem.time[0]), min(force.time[-1], stem.time[-1])
     if between[1] - between[0] < _FEWEST_SAMPLES * max(stem.period, FINEST_STEP):
@@ -363,11 +363,11 @@ def _by_strokes(
 
 
 def _unseen_between(force: _Array, position: _Array, way: _Array) -> float:
-    """Return the deviation of the friction by what happens between two points of the grid, N.
+    """Return the deviation of the friction due to events between two points of the grid, N.
 
-    Where the stem jumps from one point to the next, a force that jumps too may do so before it or
-    after it: in all jumps likewise. One that goes on as before and after leaves nothing open. `way`
-    is that of each stroke, m.
+    Where the stem jumps from one point to the next, a force that jumps too may do so before or
+    after it, and in all jumps alike. A force that changes as before and after leaves nothing open.
+    `way` is the length of each stroke, m.
     """
     moves = np.abs(np.diff(position))
     jumps = np.flatnonzero(moves > _JUMP * np.mean(np.abs(way)))
@@ -387,7 +387,7 @@ def _cut(position: _Array, turns: NDArray[np.intp], pieces: int) -> NDArray[np.i
 
 
 def _over_lags(by_lag: _Array, lag: LagPrior) -> tuple[float, float]:
-    """Return the mean of a friction over the probable lags, and the half width they leave, N."""
+    """Return the mean of a friction over the probable lags, and the half width due to them, N."""
     values = np.interp(LAGS, WORK_LAGS, by_lag)
     if lag.is_known:
         return float(np.interp(0.0, LAGS, values)), 0.0
@@ -407,10 +407,10 @@ def _believed(log_likelihoods: list[_Array], lags: Sequence[float]) -> list[_Arr
 
 
 def _of_any(log_likelihoods: Sequence[_Array]) -> _Array:
-    """Return the logarithm of a likelihood of the lags that each averaging time has a part in.
+    """Return the logarithm of a common likelihood of the lags, from all averaging times.
 
-    They see one record, so that they cannot be multiplied; where they contradict each other, any
-    may be right. The sharper one counts more, by the inverse of its width.
+    All likelihoods are of one record, so they cannot be multiplied; where they contradict each
+    other, any may be right. A sharper likelihood has more weight, by the inverse of its width.
     """
     parts = [np.exp(log) / np.sum(np.exp(log)) for log in log_likelihoods]
     together = sum(math.sqrt(float(part @ part)) * part for part in parts)
@@ -418,10 +418,10 @@ def _of_any(log_likelihoods: Sequence[_Array]) -> _Array:
 
 
 def curve_numbers(curves: Sequence[FrictionCurve]) -> dict[str, Estimated]:
-    """Return each number from the shortest averaging time that knows it as well as any.
+    """Return each number from the shortest averaging time that determines it as well as any.
 
-    The interval holds the scatter of those averaging times that know it nearly as well, and at
-    least `_LEAST_HALF_WIDTH`.
+    The interval includes the scatter of those averaging times that determine it nearly as well,
+    and at least `_LEAST_HALF_WIDTH`.
     """
     result: dict[str, Estimated] = {}
     has_spring = any("spring_constant" in curve.numbers for curve in curves)
@@ -443,7 +443,7 @@ def curve_numbers(curves: Sequence[FrictionCurve]) -> dict[str, Estimated]:
 
 
 def timed_numbers(curves: Sequence[FrictionCurve], lags: LagProfile | None) -> dict[str, Estimated]:
-    """Return the same numbers with the lag as likely as simulated stems tell it, where they do."""
+    """Return the numbers of the curves, with the lag likelihood of simulated stems if any."""
     if lags is not None and len(lags.fits) > 1:
         curves = [one.timed(lags) for one in curves]
     return curve_numbers(curves)
@@ -462,16 +462,16 @@ def checked_by_curve(
 ) -> dict[str, Estimated]:
     """Return the numbers of a simulation, checked and sharpened by those of the force balance.
 
-    Where the simulated stem `follows` the record to within noise, a number comes from the one that
-    knows it better; spring, preload and sliding friction from the simulation where both exclude
-    each other, as reversals and rests tell it a lag from a viscous friction; a part of their
-    difference then widens the intervals of spring and preload, and those of F_c and F_v where the
-    simulation does not determine F_v. Where the stem does not follow, they come from the force
-    balance, and so do spring and preload where the simulation does not determine any friction: one
-    that has a lag for it has another spring, too; F_v that no balance tells is then unknown, as all
-    that the model lacks looks like it. What both divide between dry and viscous friction
-    is uncertain by what they differ, and F_c also by a `slip_force`, N, of which no one knows at
-    which speed it is gone.
+    Where the simulated stem `follows` the record to within noise, each number comes from the source
+    that determines it better. Where both exclude each other, spring, preload and sliding friction
+    come from the simulation, as reversals and rests separate a lag from viscous friction there; a
+    part of the difference then widens the intervals of spring and preload, and those of F_c and F_v
+    where the simulation does not determine F_v. Where the stem does not follow, the numbers come
+    from the force balance, and F_v without a value there is unknown, as all that the model lacks
+    looks like it. Spring and preload also come from the balance where the simulation determines no
+    friction: a simulation with a lag in its place has another spring, too. The split into dry and
+    viscous friction is uncertain by the difference of the two, and F_c also by a `slip_force`, N,
+    since the speed at which it vanishes is unknown.
     """
     result = dict(simulated)
     viscous = simulated.get("viscous_friction")
@@ -526,11 +526,11 @@ def _as_late(
     viscous: Estimated | None,
     their_viscous: Estimated | None,
 ) -> Estimated:
-    """Return the sliding friction of a force balance as that of a late signal, if it is.
+    """Return the sliding friction of a force balance, or its rival where a signal is late.
 
-    A delay may be one of the stem by viscous friction, or one of a signal; the force balance holds
-    the friction of both (`Estimated.rival`). The simulation decides where its viscous friction
-    excludes the one of the balance.
+    A delay may come from viscous friction of the stem, or from a late signal; the force balance
+    holds the friction for both (`Estimated.rival`). The simulation decides where its viscous
+    friction excludes that of the balance.
     """
     if viscous is None or their_viscous is None or _agree(viscous, their_viscous):
         return theirs
@@ -544,7 +544,7 @@ def _as_late(
 def curve_evidence(curves: Sequence[FrictionCurve]) -> dict[str, list[float] | float]:
     """Return the friction curve that knows the sliding friction best, as plain lists, SI units.
 
-    It is that of a stem which is seen late by ``lag``, s.
+    It applies to a stem that is seen late by ``lag``, s.
     """
     if not curves:
         return {}

@@ -7,10 +7,10 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Imperfections of a plant that take part in the fit, and what is known of them beforehand.
+"""Imperfections of a plant that are part of the fit, and their priors.
 
 Each is a coordinate with a Gaussian prior about zero. Where the record does not determine it, the
-prior remains, and shows in every interval that depends on it.
+prior remains, and widens every interval that depends on it.
 """
 
 import math
@@ -24,11 +24,11 @@ from numpy.typing import NDArray
 
 
 class Profile(Enum):
-    """What is known beforehand of a valve and its instruments.
+    """Prior knowledge of a valve and its instruments.
 
     ``PLANT`` expects every imperfection, and a lag between the signals even where none was stated.
     ``BENCH`` is a rig with good instruments: the Karnopp model alone, with mass, slip and a
-    friction that falls with speed, and no lag but a stated one.
+    friction that falls with speed, and no lag except a stated one.
     """
 
     PLANT = "plant"
@@ -36,7 +36,7 @@ class Profile(Enum):
 
     @property
     def has_imperfections(self) -> bool:
-        """Whether imperfections take part in the fit."""
+        """Whether imperfections are part of the fit."""
         return self is Profile.PLANT
 
 
@@ -47,7 +47,7 @@ with the other sign a slow sensor of the pressure, s. Their sum is the lag of th
 
 @dataclass(frozen=True)
 class Imperfection:
-    """What is known of an imperfection before the record is seen.
+    """Prior knowledge of an imperfection.
 
     Attributes
     ----------
@@ -56,7 +56,7 @@ class Imperfection:
     step : float
         Change by which the motion is differentiated.
     words : str
-        What to call it in a sentence.
+        Its name in a sentence.
     """
 
     deviation: float
@@ -87,8 +87,8 @@ IMPERFECTIONS: Mapping[str, Imperfection] = MappingProxyType(
 )
 """By the name of the coordinate. Shares are of F_c (friction, slip force), of k times the measured
 range (spring) and of the force's range in a minute (drift); times s, lengths m, speeds m/s. The
-deviations of the timing are shares of `timing_uncertainty`, that of the mass is one of the mass
-that is assumed."""
+deviations of the timing are shares of `timing_uncertainty`, that of the mass is a share of the
+assumed mass."""
 
 BOUNDS: Mapping[str, float] = MappingProxyType(
     {
@@ -103,29 +103,29 @@ BOUNDS: Mapping[str, float] = MappingProxyType(
         "stribeck_velocity": 1e-4,
     }
 )
-"""Least values of the straight coordinates that have one; that of the spring is one of 1/k."""
+"""Least values of the straight coordinates that have one; the bound of the spring is on 1/k."""
 
 
 MASS_PER_AREA = 50.0
 """Standard deviation of the moving mass per diaphragm area, kg/m²: 2 kg at 0.04 m²."""
 
 _LEAST_MINUTES = 0.1
-"""Duration of a record, as far as the drift of a zero goes, at least."""
+"""Least duration of a record for the drift of a zero."""
 
 _OF_THE_MODEL = (*TIMING, "mass", "slip_force", "stribeck_velocity")
 """Coordinates that no profile leaves out."""
 
 
 def zero_drift(span: float, minutes: float) -> float:
-    """Return the deviation of what the zero of a force drifts by from the middle of a record on, N.
+    """Return the deviation of the drift of a force's zero from the middle of a record, N.
 
-    `span` is the range of its sensor, N (`sensor_span`); with 1 it is a share of that.
+    `span` is the range of the sensor, N (`sensor_span`); with 1 the result is a share of it.
     """
     return IMPERFECTIONS["drift"].deviation * span * max(minutes, _LEAST_MINUTES)
 
 
 def sensor_span(force: NDArray[np.float64]) -> float:
-    """Return the range, N, that the sensor of a force has at least, whose zero drifts with it.
+    """Return the least range, N, of the sensor of a force, to which its zero drift is proportional.
 
     In a partial stroke the force, N, above that of the reference pressure hardly changes.
     """
@@ -142,9 +142,10 @@ def deviations(
 ) -> dict[str, float]:
     """Return the standard deviation of each prior in the coordinate's own unit.
 
-    `timing` is that of each source of a lag, s. Without one they are left out, and so are the
-    imperfections that the profile does not expect; the mass of a bench lies anywhere between none
-    and twice the assumed one, that of a plant may be as large as its `diaphragm_area` suggests, m².
+    `timing` is that of each source of a lag, s. Without it lags are left out, and so are the
+    imperfections that the profile does not expect. The mass of a bench lies anywhere between zero
+    and twice the assumed mass; that of a plant may be as large as its `diaphragm_area`, m²,
+    suggests.
     """
     own = {name: one.deviation for name, one in IMPERFECTIONS.items()}
     own["mass"] = max(own["mass"] * assumed_mass, MASS_PER_AREA * diaphragm_area)

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Intervals of the reported numbers, and where they come from."""
+"""Intervals of the reported numbers, and the sources of their uncertainty."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -41,40 +41,40 @@ from valve_friction_ros.identification.trust.uncertainty import NORMAL_QUANTILE
 from valve_friction_ros.identification.units import SLIDING
 
 NumbersAt = Callable[[BroadModel, Coordinates], Mapping[str, ReportedNumber]]
-"""Function of a model and a place of its fit: numbers by name."""
+"""Function of a model and a point of its fit: numbers by name."""
 
 NOISE_LIKE = 4.0
 """Inflation of the residual up to which it may be noise of a sensor that is not quite white."""
 
 NOT_QUITE = 1.5
-"""Inflation from which on the motion is not quite that of the model.
+"""Inflation above which the motion is not quite that of the model.
 
-What the model lacks may then be taken for a lag, which the work of the measured signals does not
-know; with noise alone the inflation is 1.0 to 1.3."""
+What the model lacks may then be mistaken for a lag, which does not affect the work of the measured
+signals; with noise alone the inflation is 1.0 to 1.3."""
 
 _FAR_BEYOND = 2.0
 """Half widths beyond which a less probable explanation is named."""
 
 _FOLLOWS = 10.0
-"""Inflation of the residual over that of the best fit up to which another one follows the stem, as
-few steps lead to it."""
+"""Inflation of the residual, over that of the best fit, up to which another fit, of few steps,
+follows the stem."""
 
 UNLIKELY = 12.0
 """Penalty of the priors beyond which a fit is doubted: such imperfections together are two
-standard deviations and more above what their number makes usual."""
+standard deviations or more above what is usual for their number."""
 
 _LOST = 0.5
-"""Share by which the sliding friction of what was lost in gaps may differ from the mean."""
+"""Share by which the sliding friction in gaps may differ from the mean."""
 
 _LOOP = 0.02
-"""Share by which the work of friction by the averaged signals may be off."""
+"""Share by which the work of friction from the averaged signals may be wrong."""
 
 _FAR = 0.5
 """Share of that work by which a fit may differ from it before it is doubted, however well it
-follows the stem: a lag alone makes up for less."""
+follows the stem: a lag alone explains less."""
 
 ROUNDING = "rounding"
-"""Source of doubt of a number: the step of the converter of the force."""
+"""Source of the uncertainty of a number: the step of the converter of the force."""
 
 _FINEST = {SLIDING: FINEST_SLIDING, "spring_constant": 2e-4}
 _FINEST_OTHER = 5e-4
@@ -92,10 +92,10 @@ class Budget:
     timing : float
         Lag between the signals.
     sources : mapping of str to float
-        Of each imperfection whose prior counts, timing among them, and of the force's converter.
+        Due to each imperfection whose prior matters, timing included, and the force's converter.
     shared : float
-        Part of the timing that the record says nothing of: another record of the same sensors is
-        wrong the same way.
+        Part of the timing that the record does not determine: another record of the same sensors
+        has the same error.
     """
 
     record: float
@@ -113,10 +113,10 @@ class Estimated:
     value, half_width : float
         SI unit.
     budget : Budget
-        Where its width comes from.
+        Sources of its width.
     rival : float
-        What it would be if a slow sensor of the stem, and no viscous friction, made the stem late;
-        nan where the record excludes that.
+        The value if a slow sensor of the stem, and not viscous friction, made the stem late; nan
+        where the record excludes that.
     """
 
     value: float
@@ -126,13 +126,13 @@ class Estimated:
 
     @property
     def shared_half_width(self) -> float:
-        """Part of the half width by which another record of the same sensors is wrong alike."""
+        """Part of the half width that another record of the same sensors has in common."""
         whole = math.hypot(self.budget.record, self.budget.timing)
         return self.half_width * self.budget.shared / whole if whole > 0 else 0.0
 
     @property
     def own_half_width(self) -> float:
-        """The other part: both add in squares."""
+        """Part of the half width of this record alone: both parts add in squares."""
         return math.sqrt(max(self.half_width**2 - self.shared_half_width**2, 0.0))
 
     @property
@@ -142,12 +142,12 @@ class Estimated:
 
     @property
     def but_rounding(self) -> float:
-        """The other part: both add in squares."""
+        """Half width without `rounding`: both parts add in squares."""
         return math.sqrt(max(self.half_width**2 - self.rounding**2, 0.0))
 
     @property
     def has_rival(self) -> bool:
-        """Whether that lies far beyond the interval."""
+        """Whether the rival lies far beyond the interval."""
         return abs(self.rival - self.value) > _FAR_BEYOND * self.half_width
 
 
@@ -171,10 +171,10 @@ def _budget(fit: PosteriorFit, stage: Stage, number: ReportedNumber) -> Budget:
 
 
 def _deviation(fit: PosteriorFit, number: ReportedNumber) -> float:
-    """Deviation of a number at one place and its lag; what the fit has not done yet is added.
+    """Deviation of a number at one point and its lag, including the remaining step of the fit.
 
-    Where the stem swings, or slips between two samples, F_v is taken to be unknown by the delay k·τ
-    that a lag makes up for.
+    Where the stem swings, or slips between two samples, F_v is taken to be unknown by k·τ, for
+    which a lag τ compensates.
     """
     stage = fit.stages[-1]
     gradient = _vector(fit, number)
@@ -192,7 +192,7 @@ def _deviation(fit: PosteriorFit, number: ReportedNumber) -> float:
 def _unseen_moment(fit: PosteriorFit) -> float:
     """Return the deviation, s, of the moments at which the stem slips, over all strokes.
 
-    Each slips anywhere between two samples. The linear model takes the moment for known, as the
+    Each slip is anywhere between two samples. The linear model takes the moment as known, since the
     stem at the next sample hardly depends on it.
     """
     record = fit.model.record
@@ -207,13 +207,13 @@ def _swings(stage: Stage) -> bool:
 
 
 def _possible(fit: PosteriorFit) -> NDArray[np.float64]:
-    """Return the step that remains, where it would change no force by more than a third."""
+    """Return the remaining step, bounded so that it changes no force by more than a third."""
     bounds = np.array([0.3 * abs(fit.at[n]) if n in MAIN else math.inf for n in fit.names])
     return np.clip(fit.remaining, -bounds, bounds)
 
 
 class Doubt(Enum):
-    """Why a simulated stem tells only what the force balance tells, too."""
+    """Why a simulated stem determines no more than the force balance does."""
 
     MISFIT = auto()
     LAG = auto()
@@ -223,8 +223,8 @@ class Doubt(Enum):
 def doubt_of(fits: Sequence[PosteriorFit], profile: Profile = Profile.PLANT) -> Doubt | None:
     """Return why the best fit does not follow the record of a plant, or None where it does.
 
-    Its residual is more than noise, its lag is none that is possible, or the search could not trade
-    viscous friction for lag, where either is unknown.
+    Its residual exceeds noise, its lag is impossible, or the search could not trade viscous
+    friction for lag while both are unknown.
     """
     best = fits[0]
     if best.inflation > NOT_QUITE and profile.has_imperfections:
@@ -240,13 +240,13 @@ def estimated(
     numbers_at: NumbersAt = reported_numbers,
     lag: LagPrior | None = None,
 ) -> dict[str, Estimated]:
-    """Return numbers with their intervals, of the best fit and of those held at other lags.
+    """Return numbers with their intervals, from the best fit and those held at other lags.
 
-    `numbers_at` says what the numbers are at a place of a fit; by default the reported ones. Each
-    is integrated over the lag: by its likelihood (`LagProfile`) and the `lag` prior, unless that is
-    a stated one, which the fits hold already. Where the residual is more than noise, or the
-    imperfections are larger than usual, the interval of the sliding friction also holds what the
-    measured signals alone say (`loop_friction`).
+    `numbers_at` gives the numbers at a point of a fit; by default the reported numbers. Each is
+    integrated over the lag, by its likelihood (`LagProfile`) and the `lag` prior; a stated prior is
+    already part of the fits. Where the residual exceeds noise, or the imperfections are larger than
+    usual, the interval of the sliding friction also covers its value from the measured signals
+    alone (`loop_friction`).
     """
     fit, profile = fits[0], LagProfile.of(fits)
     late = _least_viscous(fits, numbers_at)
@@ -315,9 +315,9 @@ def _over_lags(
 def _least_viscous(
     fits: Sequence[PosteriorFit], numbers_at: NumbersAt
 ) -> Mapping[str, ReportedNumber]:
-    """Return the numbers of a fit apart with less viscous friction, if it follows the stem too.
+    """Return the numbers of a separate fit with less viscous friction, if it follows the stem too.
 
-    However large its lags are, unless a stated timing excludes them.
+    Its lags may be of any size, unless a stated timing excludes them.
     """
     best = fits[0]
     able = [

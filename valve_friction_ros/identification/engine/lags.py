@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The lag of the stem behind the force: its prior, its likelihood, and what it leaves of a number.
+"""The lag of the stem behind the force: its prior, its likelihood, and its effect on numbers.
 
 While the stem slides, F_v/k delays it as a lag of the signals does. Rests and reversals tell them
 apart: a late stem leaves its rest late, viscous friction does not hold it. The likelihood of the
@@ -41,52 +41,52 @@ One controller stamps both signals to some milliseconds; damped transmitters, tu
 clocks add up to tens. Half of all plants lie within this scale, 95 % within 51 ms."""
 
 _WIDER = 5.0
-"""Scales of the lag's prior in the deviation of a Gaussian that stands for it about none."""
+"""Deviation, in scales of the lag's prior, of a Gaussian that replaces the prior about zero."""
 
 _LEAST_DEVIATION = 5e-4
-"""Deviation, s, to which no record tells a lag better: the model has one lag, a valve many."""
+"""Least deviation, s, of a lag from any record: the model has one lag, a valve many."""
 
 _NEAR = 3.0
-"""Deviations about the lag of a fit that lies apart in which its numbers hold; one that is nearer
-to the likeliest than twice as many lies in the same valley."""
+"""Deviations about the lag of a separate fit within which its numbers hold; a fit that is nearer to
+the likeliest than twice as many lies in the same valley."""
 
 _LIKELY = 16.0
 """Cost over the best up to which fits show how rough the likelihood is."""
 
 _DEPENDENT = 1.5
 """Factor by which the logarithm of the likelihood of a lag is too sharp: the residuals of one move
-go together. Found on drawn valves."""
+are correlated. Found on drawn valves."""
 
 _MISLED, _TEMPERED = 0.03, 10.0
-"""Share of records in which the simulated stem tells a wrong lag, whatever its residual: presliding
+"""Share of records in which the simulated stem gives a wrong lag, whatever its residual: presliding
 that it does not know, or a sensor that holds its value. And the factor by which the logarithm of
-the likelihood is too sharp in these. Of drawn valves about so many, and by no more."""
+the likelihood is too sharp in these. Drawn valves show about this share, and no larger factor."""
 
 _NEGLIGIBLE, _HALVINGS = 1e-6, 24
-"""Probability of a lag that no interval notices; halvings by which an interval is found."""
+"""Probability of a lag that affects no interval; halvings by which an interval is found."""
 
 
 @dataclass(frozen=True)
 class LagPrior:
-    """What is known of the time by which the stem is seen late, before the record is.
+    """Prior of the time by which the stem is seen late.
 
     Attributes
     ----------
     deviation : float or None
-        Standard deviation of a Gaussian, s; None for the heavy-tailed prior of a plant whose timing
-        nobody has stated.
+        Standard deviation of a Gaussian, s; None for the heavy-tailed prior of a plant without a
+        stated timing.
     """
 
     deviation: float | None = None
 
     @property
     def is_known(self) -> bool:
-        """Whether there certainly is no lag."""
+        """Whether there is certainly no lag."""
         return self.deviation == 0.0
 
     @property
     def deviation_of_all(self) -> float:
-        """Largest deviation that is usual of the lag, s."""
+        """Largest usual deviation of the lag, s."""
         return TIMING_UNCERTAINTY if self.deviation is None else self.deviation
 
     @property
@@ -97,14 +97,14 @@ class LagPrior:
     def precision(self, lag: float) -> float:
         """Return the precision, 1/s², of a Gaussian that stands for the prior at `lag`.
 
-        It is wider than the heavy-tailed one, so that a regression is not held at a lag of none.
+        It is wider than the heavy-tailed prior, so that a regression is not held at zero lag.
         """
         if self.deviation is not None:
             return 1.0 / max(self.deviation, 1e-9) ** 2
         return 1.0 / ((_WIDER * USUAL_LAG) ** 2 + lag * lag)
 
     def log_density(self, lags: _Array) -> _Array:
-        """Return the logarithm of the density at each lag, s, but for a constant."""
+        """Return the logarithm of the density at each lag, s, up to a constant."""
         if self.deviation is not None:
             return np.asarray(-0.5 * (lags / max(self.deviation, 1e-9)) ** 2)
         return np.asarray(-np.log1p((lags / USUAL_LAG) ** 2))
@@ -154,8 +154,8 @@ def mixture_half_width(
 def share_of_timing(half_width: float, record: float, timing: float) -> float:
     """Return the standard uncertainty of the lag as its share of an interval.
 
-    The tails of the lag are heavier than normal ones: beside that of the `record` it is at most
-    what the `half_width` leaves.
+    The tails of the lag are heavier than normal, so its share is limited to what the `half_width`
+    leaves beside the uncertainty of the `record`.
     """
     whole = half_width / NORMAL_QUANTILE
     return min(timing, math.sqrt(max(whole**2 - record**2, 0.0)))
@@ -170,16 +170,16 @@ def spread_of(density: _Array) -> float:
 
 @dataclass(frozen=True, eq=False)
 class LagProfile:
-    """How likely each lag is, by fits that are held at some.
+    """Likelihood of the lag, from fits that are held at several lags.
 
     Attributes
     ----------
     fits : sequence of PosteriorFit
         In the order of their lags.
     apart : sequence of PosteriorFit
-        Those to which no valley leads from the others.
+        Fits to which no valley leads from the others.
     inflation : float
-        Of the residual of the best one, by which all are compared.
+        Inflation of the residual of the best fit, by which all fits are compared.
     """
 
     fits: Sequence[PosteriorFit]
@@ -188,7 +188,7 @@ class LagProfile:
 
     @classmethod
     def of(cls, fits: Sequence[PosteriorFit]) -> "LagProfile | None":
-        """Return the profile of some fits; None where none has a lag, or the best an absurd one."""
+        """Return the profile of some fits; None if no fit has a lag, or the best lag is absurd."""
         able = [one for one in fits if one.lags.any() and not one.is_apart]
         if not able:
             return None
@@ -216,18 +216,18 @@ class LagProfile:
 
     @cached_property
     def costs(self) -> _Array:
-        """Twice the negative logarithm of the likelihood of each, over the best."""
+        """Twice the negative logarithm of the likelihood of each fit, relative to the best."""
         costs = np.array([one.cost(self.inflation) for one in self.fits])
         return np.asarray(costs - np.min(costs))
 
     @cached_property
     def best(self) -> PosteriorFit:
-        """The likeliest."""
+        """The likeliest fit."""
         return self.fits[int(np.argmin(self.costs))]
 
     @cached_property
     def deviation(self) -> float:
-        """Deviation of the lag by the linear model of the likeliest, s."""
+        """Deviation of the lag by the linear model of the likeliest fit, s."""
         return max(math.sqrt(self.best.lag_variance), _LEAST_DEVIATION)
 
     @cached_property
@@ -247,9 +247,9 @@ class LagProfile:
         """Logarithm of the likelihood of each of `LAGS` by the fits alone, the likeliest at 0.
 
         A fit may end at a kink above the least cost, never below it: the costs are those of their
-        lower hull, less what the fits lie above it in the mean. Their root is linear between the
-        fits, and beyond the last ones goes on as before them. A fit that lies apart is at most as
-        likely as the best one.
+        lower hull, less the mean height of the fits above it. Their root is linear between the
+        fits, and is extrapolated beyond the last fits. A separate fit is at most as likely as the
+        best fit.
         """
         hull = _lower_hull(self.lags, self.costs)
         likely = self.costs < _LIKELY
@@ -269,9 +269,9 @@ class LagProfile:
         return np.asarray(log)
 
     def along(self, numbers: Mapping[PosteriorFit, float], slope: float) -> _Array:
-        """Return a number that each fit has at each of `LAGS`.
+        """Interpolate a number of the fits at each of `LAGS`.
 
-        Beyond the fits it has the `slope` that the linear model of the likeliest tells.
+        Beyond the fits it has the `slope` of the linear model of the likeliest fit.
         """
         values = np.interp(LAGS, self.lags, [numbers[one] for one in self.fits])
         values += slope * np.minimum(LAGS - self.lags[0], 0.0)

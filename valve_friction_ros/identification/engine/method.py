@@ -107,7 +107,7 @@ from valve_friction_ros.model.valve import KarnoppParameters, Valve
 from valve_friction_ros.signals import MeasuredRecord, as_sent_on_change, measured
 
 _WINDOWS, _SHORTEST_WINDOW = 10, 3
-"""Means of the position in which a record must show both directions, and the fewest samples in one:
+"""Means of the position in which a record must show both directions, and fewest samples in each:
 sensors that send on change leave few."""
 
 _SAME_SPEED = 0.25
@@ -122,7 +122,7 @@ Chosen: noise, drift or another valve's pressure gave 0.49 and more in 116 recor
 def identify_plant(
     recording: Recording, valve: Valve, settings: IdentificationSettings | None = None
 ) -> Result:
-    """Identify a record of a plant: stamps as they are, imperfections in the fit.
+    """Identify a record of a plant, at its own time stamps and with imperfections in the fit.
 
     The most probable model is found where each imperfection (lags, curved spring, friction that
     changes, …) has a Gaussian prior about zero. An imperfection that the record does not determine
@@ -136,15 +136,15 @@ def identify_plant(
         Geometry.
     settings : IdentificationSettings, optional
         Fixed parameters, assumed mass and timing uncertainty (by default `TIMING_UNCERTAINTY`).
-        Derivative window, order, sweep, position bias and a fixed limit velocity are those of the
-        published method, whose estimate stands beside.
+        Derivative window, order, sweep, position bias and a fixed limit velocity apply to the
+        published method, whose estimate is given alongside.
 
     Returns
     -------
     Result
-        Parameters with intervals and verdicts, `sliding_friction` among them: the work of friction
-        over the distance. The evidence is the uncertainty budget of each: its standard uncertainty
-        by the record and by the timing. The derivative window is 0.
+        Parameters with intervals and verdicts, including `sliding_friction`, the work of friction
+        per distance. The evidence is the uncertainty budget of each: its standard uncertainty due
+        to the record and to the timing. The derivative window is 0.
 
     Raises
     ------
@@ -159,7 +159,7 @@ def identify_bench(
 ) -> Result:
     """Identify a record of a rig with good instruments: the Karnopp model alone.
 
-    As `identify_plant`, without imperfections; the signals belong together to the stated timing
+    Like `identify_plant`, without imperfections. The signals are synchronous to the stated timing
     uncertainty, and exactly where none is stated. The intervals hold only as far as that is true.
 
     Parameters
@@ -264,9 +264,9 @@ def _comparable(sliding: Estimated, exponent: Estimated | None) -> dict[str, flo
 
 
 def _dissipates(balanced: Mapping[str, Estimated]) -> bool:
-    """Whether friction surely takes work from the force, as it does where both are of one valve.
+    """Whether friction surely takes work from the force, as it does if both belong to one valve.
 
-    A force that its converter rounds coarsely may be that valve's.
+    A force that its converter rounds coarsely may still belong to that valve.
     """
     if (sliding := balanced.get(SLIDING)) is None:
         return False
@@ -274,7 +274,7 @@ def _dissipates(balanced: Mapping[str, Estimated]) -> bool:
 
 
 class _Outcome(NamedTuple):
-    """What a simulation or, where none follows the record, the force balance says of it."""
+    """Results of a simulation or, where none follows the record, of the force balance."""
 
     parameters: Mapping[str, Parameter]
     numbers: Mapping[str, Estimated]
@@ -289,7 +289,7 @@ class _Outcome(NamedTuple):
 
 
 class _Beforehand(NamedTuple):
-    """What the record says without a simulation."""
+    """Results from the record without a simulation."""
 
     curves: Sequence[FrictionCurve]
     balanced: Mapping[str, Estimated]
@@ -303,7 +303,7 @@ def _of_simulation(
     profile: Profile,
     known: _Beforehand,
 ) -> _Outcome:
-    """Simulate the stem as the profile has it; the friction curve is its start and its check."""
+    """Simulate the stem by the profile; the friction curve is its start and its check."""
     curves, balanced, departed = known
     if settings.fixed.get("spring_constant") == 0.0:
         raise RefusalError(
@@ -349,7 +349,7 @@ def _of_simulation(
 
 
 def _correlation(fit: PosteriorFit, numbers_at: NumbersAt) -> Correlation:
-    """Return how the errors of the numbers go together at the most probable place."""
+    """Return the correlation of the numbers at the most probable point."""
     numbers = numbers_at(fit.model, fit.at)
     gradients = {
         name: np.array([one.gradient.get(free, 0.0) for free in fit.names])
@@ -360,7 +360,7 @@ def _correlation(fit: PosteriorFit, numbers_at: NumbersAt) -> Correlation:
 
 
 def _beside_lags(mass: Estimated, spring: float) -> Estimated:
-    """Return the mass with the doubt that lags leave: seen late by τ, a spring has the mass k·τ²/2.
+    """Widen the mass by the effect of lags: seen late by τ, a spring seems to have the mass k·τ²/2.
 
     That is what a shift by a lag leaves of it, beside the elastic creep of a packing.
     """
@@ -390,8 +390,8 @@ def _with_departures(outcome: _Outcome, departed: Departed | None) -> _Outcome:
 def _sliding_speed(fit: PosteriorFit, curves: Sequence[FrictionCurve]) -> float:
     """Return the mean speed of the simulated stem over the distance, m/s.
 
-    How fast a stem jumps, its simulation knows as little as its sensor, but another record of the
-    same sensor is seen alike: where both speeds differ, the measured one counts.
+    The simulation knows the speed of a jump no better than the sensor does, but another record of
+    the same sensor shows it alike: where the two speeds differ, the measured speed is returned.
     """
     speed = mean_speed(fit.model.simulate(fit.at).velocity)
     if not curves:
@@ -407,7 +407,7 @@ def _of_force_balance(
     why: str,
     force_range: float,
 ) -> _Outcome:
-    """Take the force balance of the sliding stem alone; `why` says why none was simulated."""
+    """Use the force balance of the sliding stem alone; `why` says why no stem was simulated."""
     numbers = {name: one for name, one in numbers.items() if name != SPEED_EXPONENT}
     best = next(one for one in curves if one.numbers[SLIDING].value == numbers[SLIDING].value)
     misfit = curve_misfit(best, numbers[SLIDING])
@@ -451,7 +451,7 @@ def require_record(record: MeasuredRecord, valve: Valve, settings: Identificatio
 
 
 def stamped_record(recording: Recording) -> StampedRecord:
-    """Return the samples at their own stamps, or on the grid where there are no others."""
+    """Return the samples at their own stamps, or on the grid if they have none."""
     if (stamped := recording.stamped) is not None:
         return replace(
             stamped,
@@ -472,7 +472,7 @@ def prior_of(
     profile: Profile = Profile.PLANT,
     valve: Valve | None = None,
 ) -> Prior:
-    """Return what is known before a record is seen, of any valve or of that one."""
+    """Return the prior knowledge of any valve, or of the `valve` given."""
     known = known_of(settings)
     area = 0.0
     if valve is not None and settings.assumed_mass == IdentificationSettings.assumed_mass:
@@ -482,7 +482,7 @@ def prior_of(
 
 
 def numbers_of(profile: Profile) -> NumbersAt:
-    """Return the reported numbers as functions of a place of the fit."""
+    """Return the reported numbers as functions of a point of the fit."""
     asymmetry = ASYMMETRY if profile.has_imperfections else 0.0
     return partial(reported_numbers, asymmetry=asymmetry)
 
@@ -493,7 +493,7 @@ def known_of(settings: IdentificationSettings) -> dict[str, float]:
 
 
 def lag_prior_of(settings: IdentificationSettings, profile: Profile = Profile.PLANT) -> LagPrior:
-    """Return what is known of the lag between the signals."""
+    """Return the prior of the lag between the signals."""
     timing = settings.timing_uncertainty
     return LagPrior(0.0 if timing is None and not profile.has_imperfections else timing)
 
@@ -526,7 +526,7 @@ def _doubts(misfit: Misfit) -> tuple[str, ...]:
 
 
 def _left_to_published(settings: IdentificationSettings) -> tuple[str, ...]:
-    """Say that a position bias has no part in a fit that finds the preload."""
+    """Say that a position bias is not used in a fit that finds the preload."""
     if settings.position_bias is None:
         return ()
     return (
@@ -536,7 +536,7 @@ def _left_to_published(settings: IdentificationSettings) -> tuple[str, ...]:
 
 
 def _stem(fit: PosteriorFit, stamped: StampedRecord) -> StemComparison:
-    """Return the measured stem and the simulated one as its sensor shows it, at each step."""
+    """Return the measured stem and the simulated reading of its sensor, at each step."""
     record = fit.model.record
     steps = np.arange(record.force.size) * record.period
     readings = fit.model.readings(fit.at).mean(axis=0)

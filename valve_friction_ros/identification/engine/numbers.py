@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""What a place of the fit says of the numbers that are reported, and how they depend on it."""
+"""Reported numbers at a point of the fit, and their derivatives by its coordinates."""
 
 import math
 from collections.abc import Mapping
@@ -27,13 +27,13 @@ _MOVING = 0.02
 """Share of the top speed above which the averaged stem moves."""
 
 ASYMMETRY = 0.05
-"""Standard deviation of the share by which F_c is larger upward: it is the same as a change of
+"""Standard deviation of the share by which F_c is larger upward: it has the effect of a change of
 F_0, and no record can separate the two."""
 
 
 @dataclass(frozen=True)
 class ReportedNumber:
-    """A number at one place of the fit.
+    """A number at one point of the fit.
 
     Attributes
     ----------
@@ -42,8 +42,8 @@ class ReportedNumber:
     gradient : mapping of str to float
         Its derivatives by the coordinates.
     definition : float
-        Standard deviation by what the number means where it is not one: a friction that changes
-        along the travel, the constant of a curved spring.
+        Standard deviation due to the definition where the quantity has no single value: a friction
+        that changes along the travel, the constant of a curved spring.
     """
 
     value: float
@@ -80,13 +80,13 @@ def _sliding(model: BroadModel, at: Coordinates, asymmetry: float) -> ReportedNu
 def reported_numbers(
     model: BroadModel, at: Coordinates, asymmetry: float = ASYMMETRY
 ) -> dict[str, ReportedNumber]:
-    """Return all reported numbers at a place of the fit.
+    """Return all reported numbers at a point of the fit.
 
     `asymmetry` is the standard deviation of the share by which F_c is larger upward.
 
     A friction that changes by ±a over the travel or over the record, or that is larger by a at low
-    speed, has no single value; the number is then taken to lie anywhere within ±a. So is a spring
-    whose constant changes by ±4c over the measured range.
+    speed, has no single value; the number is then taken to lie anywhere within ±a. The same
+    applies to a spring whose constant changes by ±4c over the measured range.
     """
     slow = model.record.slow
     dry, spring = at["coulomb_friction"], at["spring_constant"]
@@ -118,7 +118,7 @@ def reported_numbers(
 
 
 def found_sizes(_: BroadModel, at: Coordinates) -> dict[str, ReportedNumber]:
-    """Return imperfections at a place of the fit that may be compared with those of another record.
+    """Return imperfections at a point of the fit that may be compared with those of another record.
 
     The ``lag`` of the stem behind the pressure, s, is the sum of all timing; ``slip_force`` is
     F_s − F_c, N; ``viscous_asymmetry`` is the share by which F_v is larger upward.
@@ -136,9 +136,9 @@ def found_sizes(_: BroadModel, at: Coordinates) -> dict[str, ReportedNumber]:
 def loop_friction(model: BroadModel, at: Coordinates) -> float:
     """Return the work of friction over the distance by the measured signals alone, N.
 
-    The work of the actuator less what the spring keeps: ∫(F − k·x − F_0)·dx / ∫|dx|. It takes the
-    spring from the fit, which counts only as far as the stem does not end where it began, and no
-    model of the friction.
+    The work of the actuator less what the spring keeps: ∫(F − k·x − F_0)·dx / ∫|dx|. The spring is
+    taken from the fit, and matters only if the stem does not end where it began. No model of the
+    friction is used.
     """
     slow = model.record.slow
     position = slow.lowest + 0.5 * (slow.place + 1.0) * slow.range

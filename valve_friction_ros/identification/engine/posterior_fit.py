@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Most probable coordinates of a model with priors, and what is left uncertain."""
+"""Most probable coordinates of a model with priors, and their remaining uncertainty."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -35,8 +35,8 @@ def bounded_minimum(
 ) -> NDArray[np.float64]:
     """Minimise q'·A·q/2 − b'·q under q ≥ `lowest`, by an active set.
 
-    A coordinate that would leave its range is held at its end, and the others are solved anew; one
-    that is held though the form falls inwards is let go, for half of the rounds at most.
+    A coordinate that would leave its range is held at its bound, and the others are solved again; a
+    held coordinate is released where the form falls inwards, for half of the rounds at most.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ def bounded_minimum(
     slope : ndarray of float, shape (p,)
         b.
     lowest : ndarray of float, shape (p,)
-        At most zero; minus infinity where there is no end.
+        At most zero; minus infinity where there is no bound.
 
     Returns
     -------
@@ -82,16 +82,16 @@ In right fits of 13 records of a benchmark it is 0.2 to 1.04."""
 _LARGEST_CHANGE = 0.5
 _LEAST_COMMON = 0.01
 _RISES = 1
-"""Steps upwards that a fit at a held lag may take between two places lower than all before.
+"""Upward steps that a fit at a held lag may take between two points lower than all before.
 
-Where a stem sticks or breaks away the sum of squares has kinks, which hold a fit that only falls.
+Where a stem sticks or breaks away the sum of squares has kinks, which stop a fit that only falls.
 """
 
 _UNSEEN = 1e-15
 """Least curvature over the largest: what the record does not see at all is unknown, not certain."""
 
 _PINNED = 1e-4
-"""Deviation, s, by which a lag may differ from the one at which a fit pins it."""
+"""Deviation, s, of a lag from the value at which a fit pins it."""
 
 _BLOCK = 512
 _MOVED = ("coulomb_friction", "viscous_friction", "spring_constant", "spring_preload", "slip_force")
@@ -99,14 +99,14 @@ _MOVED = ("coulomb_friction", "viscous_friction", "spring_constant", "spring_pre
 
 @dataclass(frozen=True, eq=False)
 class Stage:
-    """A place that the fit came by.
+    """A point that the fit has passed.
 
     Attributes
     ----------
     at : mapping of str to float
         All coordinates.
     covariance : ndarray of float, shape (p, p)
-        Posterior covariance of the free ones, the model taken as linear there.
+        Posterior covariance of the free coordinates, with the model linearised there.
     misfit : float
         Sum of the squared residuals over their effective variances, not inflated.
     penalty : float
@@ -130,15 +130,15 @@ class PosteriorFit:
     names : tuple of str
         The free coordinates.
     stages : tuple of Stage
-        All that it came by, the last is the end.
+        All points that it has passed; the last is the end.
     inflation : float
-        Of the residual at the end.
+        Inflation of the residual at the end.
     precision : ndarray of float, shape (p,)
         One over the variance of each prior, 0 without one.
     remaining : ndarray of float, shape (p,)
         Step that the linear model would still take.
     residual : ndarray of float, shape (c,)
-        Measured less simulated readings, m, the mean of both halves.
+        Measured minus simulated readings, m, the mean of both halves.
     kept : tuple of str
         Free coordinates that stay where their priors are centred, and widen the intervals only.
     is_apart : bool
@@ -162,21 +162,21 @@ class PosteriorFit:
 
     @property
     def objective(self) -> float:
-        """Squares of residuals and of distances from the priors together."""
+        """Sum of the squares of residuals and of distances from the priors."""
         return self.stages[-1].misfit + self.stages[-1].penalty
 
     def cost(self, inflation: float) -> float:
-        """Return the same with the squares of residuals over an inflation."""
+        """Return the objective with the squares of residuals divided by an inflation."""
         return self.stages[-1].misfit / inflation + self.stages[-1].penalty
 
     @property
     def plain_misfit(self) -> float:
-        """Sum of the squared residuals with the noise of the pressure in them."""
+        """Sum of the squared residuals, including the noise of the pressure."""
         return float(np.sum((self.residual * self.model.weights) ** 2))
 
     @property
     def lag(self) -> float:
-        """Time by which the stem is seen late in all, s."""
+        """Total time by which the stem is seen late, s."""
         return lag_of(self.at)
 
     @property
@@ -191,13 +191,13 @@ class PosteriorFit:
 
     @property
     def along_lag(self) -> NDArray[np.float64]:
-        """Change of each free coordinate for a lag of a second, by the same, shape (p,)."""
+        """Change of each free coordinate per second of lag, by the same model, shape (p,)."""
         along = self.stages[-1].covariance @ self.lags
         return np.asarray(along / max(float(self.lags @ along), np.finfo(float).tiny))
 
 
 def lag_of(at: Coordinates) -> float:
-    """Return the time by which the stem is seen late in all, s."""
+    """Return the total time by which the stem is seen late, s."""
     return sum(at[name] for name in TIMING)
 
 
@@ -205,8 +205,8 @@ def _misfit(model: BroadModel, residual: NDArray[np.float64]) -> float:
     """Sum the products of both halves' residuals: noise of the pressure adds nothing to it.
 
     The product of two numbers is the square of their mean less that of half their difference. The
-    difference counts as far as the noise of the pressure explains it: the simulated stems of both
-    halves may go different ways.
+    difference is included as far as the noise of the pressure explains it: the simulated stems of
+    both halves may go different ways.
     """
     even, odd = residual * model.weights
     mean, apart = float(np.sum((even + odd) ** 2)), float(np.sum((even - odd) ** 2))
@@ -216,8 +216,8 @@ def _misfit(model: BroadModel, residual: NDArray[np.float64]) -> float:
 def _common(own: NDArray[np.float64], cross: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the information that both halves share.
 
-    What the noise of the pressure adds to the derivatives is not in their products `cross`. Where
-    chance leaves less than `_LEAST_COMMON` of what one half for itself claims, that much is kept.
+    Noise of the pressure in the derivatives does not enter their products `cross`. Where chance
+    leaves less than `_LEAST_COMMON` of the information of one half alone, that share is kept.
     """
     values, vectors = np.linalg.eigh(own)
     root = np.sqrt(np.maximum(values, max(1e-15 * float(values[-1]), np.finfo(float).tiny)))
@@ -229,7 +229,7 @@ def _common(own: NDArray[np.float64], cross: NDArray[np.float64]) -> NDArray[np.
 def _products(rows: NDArray[np.float64]) -> NDArray[np.float64]:
     """Multiply a matrix by its transpose, block by block.
 
-    For larger ones NumPy's library starts threads, which wait for one another on a busy machine.
+    For larger blocks NumPy's library starts threads, which wait for one another on a busy machine.
     """
     blocks = np.array_split(rows, max(rows.shape[1] // _BLOCK, 1), axis=1)
     return np.asarray(np.sum([block @ block.T for block in blocks], axis=0))
@@ -310,7 +310,7 @@ class _Problem:
         return misfit / self.inflation + self.penalty(at) + away**2
 
     def penalty(self, at: Coordinates) -> float:
-        """Squared distances from the priors, those of coordinates that are not free among them."""
+        """Squared distances from the priors, including those of coordinates that are not free."""
         return sum(
             ((at[name] - self.centre.get(name, 0.0)) / deviation) ** 2
             for name, deviation in self.deviations.items()
@@ -343,7 +343,7 @@ class _Move(NamedTuple):
 
 
 def _descended(problem: _Problem) -> _Move:
-    """Take the first step that leads down, or the one that leads up the least."""
+    """Take the first step that leads down, or the step that leads up the least."""
     now, moves = problem.here, []
     for damping in _DAMPINGS:
         step = problem.step(damping)
@@ -367,19 +367,20 @@ def fit(
     steps: int,
     pinned: float | None = None,
 ) -> PosteriorFit:
-    """Go down from `start` to the most probable coordinates, by Gauss–Newton's method.
+    """Descend from `start` to the most probable coordinates, by the Gauss–Newton method.
 
     With the readings y, those of the model h(θ), the weights W and the priors N(c, Λ⁻¹), the sum
 
         |W·(y − h(θ))|²/κ + (θ − c)ᵀ·Λ·(θ − c)
 
-    is made small; κ is the `inflation` of the residual. The posterior covariance is
+    is minimised; κ is the `inflation` of the residual. The posterior covariance is
 
         (HᵀW²H/κ + Λ)⁻¹ .
 
     The simulated stem carries noise of the pressure, and less of it the more the model damps; a
     plain sum of squares would take that for information. In each product one factor is therefore
-    of the even samples of the pressure, the other one of the odd ones, whose noise is independent.
+    from the even samples of the pressure, the other from the odd samples, whose noise is
+    independent.
 
     Parameters
     ----------
@@ -388,15 +389,15 @@ def fit(
     start : mapping of str to float
         All coordinates.
     names : tuple of str
-        The free ones.
+        The free coordinates.
     deviations : mapping of str to float
         Standard deviations of the priors; without one a coordinate is free.
     centre : mapping of str to float
-        Their means; 0 where none is given.
+        Means of the priors; 0 where none is given.
     steps : int
-        Steps at most; with 0 the posterior at `start` is told.
+        Most steps; with 0 the posterior at `start` is returned.
     pinned : float, optional
-        Lag in all, s, that the fit keeps.
+        Total lag, s, that the fit keeps.
     """
     at = dict(start)
     problem = _Problem(model, at, names, deviations, centre, model.readings(at), pinned)

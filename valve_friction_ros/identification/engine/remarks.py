@@ -17,44 +17,44 @@ from valve_friction_ros.signals import quantisation_step, stamped_noise, without
 from valve_friction_ros.wording import percentage
 
 _JITTER = 0.01
-"""Scatter of the pauses, over the period, from which on stamps are irregular."""
+"""Scatter of the pauses, over the period, above which stamps are irregular."""
 
 _IRREGULAR = 0.25
-"""The same, from which on a pause no longer tells whether a sample is missing."""
+"""The same, above which a pause no longer shows whether a sample is missing."""
 
 _DROPS = 0.005
-"""Share of samples that are missing from which on they are named."""
+"""Share of missing samples above which they are reported."""
 
 _LONG = 1.5
-"""Pause, over the period, from which on a sample may be missing."""
+"""Pause, over the period, from which a sample may be missing."""
 
 _GAP = 10.0
 _RATES = 1.5
 _HELD = 1.5
-"""Mean number of equal samples in a row, while the signal moves, from which on it is held."""
+"""Mean number of equal samples in a row, while the signal moves, above which it is held."""
 
 _COARSE = 1.0
-"""Step of a converter over the deviation of the noise, from which on the step counts."""
+"""Step of a converter, over the deviation of the noise, above which the step is coarse."""
 
 _LASTING = 0.016
 """Time, s, between samples whose noise is compared with that of neighbours."""
 
 _COLOURED = 2.0
-"""Noise over that of neighbours from which on it is said to last.
+"""Noise, over that of neighbours, above which it is reported as lasting.
 
 It is 1 for white noise, up to 1.5 in a benchmark's records of jerking stems, 2.6 and more where
 noise has a memory of 5 ms."""
 
 _FEWEST = 500
 _SLOW = 0.02
-"""Period, s, from which on a slow stem may not be followed through its corners."""
+"""Period, s, above which a slow stem may not be followed through its corners."""
 
 
 def _missing_share(pauses: NDArray[np.float64]) -> float:
-    """Share of the samples that did not come, from `pauses` over the period, outside of gaps.
+    """Share of the samples that are missing, from `pauses` over the period, outside gaps.
 
-    A pause is long by a lost sample or by jitter. What jitter adds to it, the pauses beside
-    it lack; so these are counted with it.
+    A pause is long because of a lost sample or jitter. Jitter takes from the neighbouring pauses
+    what it adds to this one, so they are counted with it.
     """
     near = pauses[pauses <= _GAP]
     long = np.convolve(near >= _LONG, np.ones(3), "same") > 0
@@ -115,7 +115,7 @@ def _noise_remarks(name: str, signal: StampedSignal) -> list[str]:
 
 
 def sampling_remarks(record: StampedRecord) -> tuple[str, ...]:
-    """Return a sentence for each way in which the samples are not what a good sensor sends."""
+    """Return a sentence for each way in which the samples differ from those of a good sensor."""
     remarks, words = [], record.driven_by.words
     for name, signal in ((f"the {words}", record.drive), ("the stem", record.position)):
         remarks += _stamp_remarks(name, signal) + _value_remarks(name, signal)

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""From a record to the best fit: starts from a regression, and branches where it is stuck."""
+"""Search for the best fit of a record: it starts from a regression, and branches where stuck."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -43,8 +43,8 @@ _LAGS = (-2.0, -1.5, -1.0, -0.5, -0.25, 0.25, 0.5, 1.0, 1.5, 2.0)
 """Lags to start from, in timing uncertainties."""
 
 _LEAST_VISCOUS = 0.1
-"""Share of the viscous friction that a start keeps: without any a stem swings, and no derivative
-tells the way."""
+"""Share of the viscous friction that a start keeps: without any, the stem swings and no derivative
+shows the way."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class Sliding:
     friction : float
         Sliding friction at the mean speed, N.
     speed : float
-        That speed, m/s.
+        Mean speed, m/s.
     spring_constant, spring_preload : float
         The spring.
     """
@@ -98,7 +98,7 @@ def split(sliding: Sliding, share: float) -> dict[str, float]:
 def nearest(model: BroadModel, starts: Sequence[Coordinates]) -> list[Coordinates]:
     """Sort starts by the distance of their simulated stem from the measured one.
 
-    The mean magnitude counts: a single jump at the wrong time says little of a start.
+    The distance is a mean magnitude: a single jump at the wrong time says little about a start.
     """
 
     def distance(start: Coordinates) -> float:
@@ -114,10 +114,10 @@ def splits(regressed: Sliding, base: Coordinates) -> list[Coordinates]:
 
 
 def lagging(at: Coordinates, timing_uncertainty: float) -> list[Coordinates]:
-    """Return starts with one lag each, and with as much less of the delay F_v/k.
+    """Return starts with one lag each, and the delay F_v/k reduced by it.
 
-    A sliding stem follows the force by F_v/k, and a lag of a sensor adds to that; a fit without
-    lags finds their sum. From there the fit with all of them leads into many a wrong valley.
+    A sliding stem lags the force by F_v/k, and a lag of a sensor adds to that; a fit without lags
+    finds their sum. From there a fit with all lags may lead into a wrong valley.
     """
     starts: list[Coordinates] = []
     for name in TIMING:
@@ -144,12 +144,12 @@ _SURE_FALL = 2.0
 
 _START_NOISE = 3.0
 _START_TIME = 5e-3
-"""The first position is known to so many deviations of its noise, and to what the stem moves in
-such a time (s) and in that by which its sensor may be late."""
+"""Uncertainty of the first position: deviations of its noise, and the time (s) in which the stem
+moves, to which the time by which its sensor may be late is added."""
 
 _MOST_WORK, _FOR_LAGS = 36_000_000, 10_000_000
-"""Steps of simulations after which no other branch begins, and what is left for other lags after
-them: a second of a processor or so, and a third of one.
+"""Simulation steps after which no other branch begins, and steps reserved for other lags after
+them: a second of processor time or so, and a third of a second.
 
 A count and not a time, so that the answer does not depend on the machine."""
 
@@ -157,22 +157,22 @@ _OF_TANGENT = 5
 """Simulations that take as long as one that carries all derivatives along."""
 
 _COARSENESS = 100.0
-"""Of the derivatives until a fit is near its end."""
+"""Coarseness of the derivatives until a fit is near its end."""
 
 _FEWEST_STEPS = 2
 _PROFILE, _PROFILE_STEPS = 3, 4
 _LEAST_STEP, _LARGEST_STEP = 5e-4, 20e-3
 _IMPROBABLE, _LEAST_LEFT = 16.0, 0.1
-"""Lags each way at which the likelihood is followed, and steps of a fit there; least and largest of
-the first step along the lag, s, which is one deviation by the linear model; the rise of the cost
+"""Lags each way at which the likelihood is followed, and steps of a fit there; least and largest
+first step along the lag, s, which is one deviation by the linear model; the rise of the cost
 after which the next lag lies nearer; and the share of a force that a start keeps."""
 
 _DEMANDED = 30.0
 """Fall of the sum of squares, in inflated variances (5.5 standard errors), below which no record
-demands a slip, nor that of a bench a further coordinate."""
+demands a slip, and no record of a bench a further coordinate."""
 
 _WORTH = 1.0
-"""Fall of the same by which another fit is worth going down from."""
+"""Fall of the same sum for which another fit is worth descending from."""
 
 _FEW_STEPS = 6
 _MORE_STEPS = 12
@@ -180,21 +180,21 @@ _MORE_STEPS = 12
 
 @dataclass(frozen=True)
 class Prior:
-    """What is known beforehand.
+    """Prior knowledge of a valve and its signals.
 
     Attributes
     ----------
     lag : LagPrior
-        Of the time by which the stem is seen late.
+        Prior of the time by which the stem is seen late.
     mass : float
-        Mass to be expected, kg.
+        Expected mass, kg.
     fixed : mapping of str to float
         Coordinates that are known.
     profile : Profile
-        Which imperfections take part in the fit.
+        Which imperfections are part of the fit.
     diaphragm_area : float
-        By which the mass of a plant may be larger than expected, m²; 0 where there is none, or the
-        mass was stated.
+        Area, m², from which the mass of a plant may be larger than expected; 0 where there is none,
+        or the mass was stated.
     """
 
     lag: LagPrior
@@ -285,7 +285,7 @@ class _Search:
         return self.fit(near.at, names, _MORE_STEPS, self.exact)
 
     def free(self, at: Coordinates) -> tuple[str, ...]:
-        """Return all coordinates that are free; of friction that falls with speed v_s is one."""
+        """Return the free coordinates; v_s is one where friction falls with speed."""
         if not at["stribeck_velocity"] > 0:
             return self.all
         others = tuple(name for name in self.all if name != "at_low_speed")
@@ -317,7 +317,7 @@ class _Search:
     def curved(self) -> PosteriorFit | None:
         """Fit a friction that falls with speed, from the friction curves, each move alone first.
 
-        None without such curves, or where that alone takes all the time.
+        None without such curves, or where the first fit takes all the work.
         """
         starts = self.from_curves()
         if not starts:
@@ -333,7 +333,7 @@ class _Search:
     def falling(self, at: Coordinates) -> list[Coordinates]:
         """Let the friction fall with speed, from the static friction of the departures if known.
 
-        How slow the stem must be for that, a curve of the sliding friction seldom tells.
+        A curve of the sliding friction seldom shows how slow the stem must be for that.
         """
         dry = at["coulomb_friction"]
         slips = [dry * share for share in _SLIPS]
@@ -355,7 +355,7 @@ class _Search:
         return self.full(nearest(self.model, dead)[0])
 
     def demanded(self, best: PosteriorFit) -> PosteriorFit:
-        """Take a falling friction, and a slip, only where the record of a bench demands them.
+        """Accept a falling friction, and a slip, only where the record of a bench demands them.
 
         The mass stays as expected, and is as uncertain as its prior says.
         """
@@ -379,10 +379,10 @@ class _Search:
         )
 
     def without_slip(self, best: PosteriorFit) -> PosteriorFit:
-        """Take a slip only where the record demands it, or friction falls with speed besides.
+        """Accept a slip only where the record demands it, or where friction also falls with speed.
 
-        A stem that is sampled slowly, behind a volume or a filter, is late as if it had stuck. A
-        slip of none is as uncertain as the record of a plant leaves it; that of a bench has none.
+        A stem that is sampled slowly, behind a volume or a filter, is late as if it had stuck. On a
+        plant a slip of zero stays as uncertain as the record leaves it; on a bench it is dropped.
         """
         if best.at["stribeck_velocity"] or not best.at["slip_force"] > 0.0:
             return best
@@ -395,12 +395,12 @@ class _Search:
         return self.fit(plain.at, best.names, 0, self.exact)
 
     def profiled(self, best: PosteriorFit) -> list[PosteriorFit]:
-        """Fit with other lags, each held, both ways from the best one and at none.
+        """Fit at other lags, each held: later and earlier than the best lag, and at zero.
 
         F_v/k delays a sliding stem as a lag does. The two trade places along a valley that is too
-        bent for the linear model at its deepest point, so each fit begins at its neighbour. And a
-        slow sensor of the stem may make up for all viscous friction; no valley leads there. A stem
-        that the best fit does not follow tells no lag.
+        bent for the linear model at its deepest point, so each fit begins at its neighbour. A slow
+        sensor of the stem may also replace all viscous friction; no valley leads there. A best fit
+        that does not follow the stem determines no lag.
         """
         if not best.lags.any():
             return []
@@ -417,7 +417,7 @@ class _Search:
         return found
 
     def followed(self, best: PosteriorFit, way: float) -> list[PosteriorFit]:
-        """Fit with later lags, or earlier ones, each from the last that is probable."""
+        """Fit at later or earlier lags, each from the last probable fit."""
         found: list[PosteriorFit] = []
         last, step = best, _first_step(best)
         for _ in range(_PROFILE):
@@ -432,7 +432,7 @@ class _Search:
         return found
 
     def held(self, best: PosteriorFit, at: Coordinates, lag: float) -> PosteriorFit:
-        """Fit with one lag, s, from where the linear model of the best fit leads from a place."""
+        """Fit at one lag, s, from the point to which the linear model of the best fit leads."""
         start = dict(at)
         for name, share in zip(best.names, best.along_lag.tolist(), strict=True):
             there = start[name] + share * (lag - lag_of(at))
@@ -441,7 +441,7 @@ class _Search:
         return self.fit(start, best.names, _PROFILE_STEPS, self.exact, lag)
 
     def behind_slow_sensor(self, best: PosteriorFit) -> PosteriorFit:
-        """Fit a stem with hardly any viscous friction behind a slow sensor of its place."""
+        """Fit a stem with hardly any viscous friction behind a slow sensor of its position."""
         spring = best.at["spring_constant"]
         late = best.lag + _delay(best) - SWINGING
         start = {
@@ -455,7 +455,7 @@ class _Search:
         return replace(found, is_apart=True)
 
     def all_probable(self) -> list[PosteriorFit]:
-        """Return the most probable fit, and those with which it competes."""
+        """Return the most probable fit, and its competitors."""
         best = self.best()
         if not self.prior.profile.has_imperfections:
             best = self.demanded(best)
@@ -470,7 +470,7 @@ class _Search:
         return [best, *others]
 
     def from_curves(self) -> list[Coordinates]:
-        """Return what the friction curves say, as starts."""
+        """Return starts from the friction curves."""
         starts: list[Coordinates] = []
         for curve in self.curves:
             law = curve.law
@@ -513,7 +513,7 @@ class _Search:
     def smooth(self) -> PosteriorFit | None:
         """Fit from the friction curves, without a fall of the friction with speed.
 
-        That costs ten times as much.
+        A fall costs ten times as much.
         """
         starts = [{**one, "stribeck_velocity": 0.0} for one in self.from_curves()]
         if not starts:
@@ -522,7 +522,7 @@ class _Search:
         return self.full(self.fit(nearest(self.model, starts)[0], few, _FEW_STEPS).at)
 
     def best(self) -> PosteriorFit:
-        """Return the most probable of all fits; one that is likely ends the search."""
+        """Return the most probable of all fits; a likely fit ends the search."""
         branches: list[Callable[[], PosteriorFit | None]]
         branches = [self.smooth, self.curved, lambda: self.full(self.start())]
         fits: list[PosteriorFit] = []
@@ -533,7 +533,7 @@ class _Search:
         return best if self.is_enough(fits) else _likeliest([best, self.stopping(best)])
 
     def is_enough(self, fits: Sequence[PosteriorFit]) -> bool:
-        """Whether one of the fits is likely, or no other may be tried."""
+        """Whether one of the fits is likely, or no other branch may be tried."""
         likely = any(
             one.inflation < _SUSPICIOUS
             and one.stages[-1].penalty < UNLIKELY
@@ -544,13 +544,13 @@ class _Search:
 
 
 def _likeliest(fits: Sequence[PosteriorFit]) -> PosteriorFit:
-    """Return the fit whose residual and priors together are the least, by the same inflation."""
+    """Return the fit with the least sum of residual and prior terms, at a common inflation."""
     inflated = min(one.inflation for one in fits)
     return min(fits, key=lambda one: one.stages[-1].misfit / inflated + one.stages[-1].penalty)
 
 
 def _lowest(fits: Sequence[PosteriorFit]) -> PosteriorFit:
-    """Return the first fit, or one that lies surely lower.
+    """Return the first fit, or one with a surely lower cost.
 
     A stem behind a slow sensor is taken only where the record demands it. Without viscous friction
     a stem jumps with the noise of the pressure: its halves differ, which lowers the sum of their
@@ -577,7 +577,7 @@ def _fall_at_low_speed(fit: PosteriorFit) -> float:
 
 
 def _first_step(fit: PosteriorFit) -> float:
-    """Return the deviation of the lag by the linear model, s, within what a step may be."""
+    """Return the deviation of the lag by the linear model, s, within the limits of a step."""
     return float(np.clip(math.sqrt(fit.lag_variance), _LEAST_STEP, _LARGEST_STEP))
 
 
@@ -592,16 +592,16 @@ def search(
     curves: Sequence[FrictionCurve] = (),
     static_friction: float = math.nan,
 ) -> list[PosteriorFit]:
-    """Find the most probable model of a record, and the ones that compete with it.
+    """Find the most probable model of a record, and its competitors.
 
-    The friction curve starts a fit of few coordinates, and that one a fit with all imperfections.
-    Where the residual is more than noise, a fit with friction that falls with speed follows, of
-    each move for itself first; it starts at the `static_friction`, N, that the departures tell, if
-    they do. Where that does not do either, or there is no curve, the sliding friction of a plain
-    regression is split into F_c and F_v in several ways, without and with a slip; the way whose
-    simulated stem is nearest starts a fit, and again with the likeliest lag. Then follows one with
-    a dead zone. At the end the likelihood is followed along the lag, which viscous friction makes
-    up for, and to a slow sensor of the stem in place of all viscous friction.
+    The friction curve starts a fit of few coordinates, which starts a fit with all imperfections.
+    Where the residual exceeds noise, a fit with friction that falls with speed follows, of each
+    move by itself first; it starts at the `static_friction`, N, of the departures, if known. Where
+    that fails too, or there is no curve, the sliding friction of a plain regression is split into
+    F_c and F_v in several ways, without and with a slip; the split whose simulated stem is nearest
+    starts a fit, and again with the likeliest lag. Then follows a fit with a dead zone. At the end
+    the likelihood is followed along the lag, for which viscous friction compensates, and to a slow
+    sensor of the stem in place of all viscous friction.
 
     Raises
     ------
@@ -614,18 +614,18 @@ def search(
 def posteriors_at(
     record: FittedRecord, prior: Prior, truth: Coordinates, with_competitors: bool
 ) -> list[PosteriorFit]:
-    """Return what a record says of a model that is known to be the right one, without a search.
+    """Return the posterior of a record about a model that is known to be right, without a search.
 
     Parameters
     ----------
     record : FittedRecord
         A simulated record.
     prior : Prior
-        What an identification would know beforehand.
+        Prior knowledge of an identification.
     truth : mapping of str to float
         Coordinates of the simulated valve; the others are absent.
     with_competitors : bool
-        Whether the fits follow that trade viscous friction for lag, as those of `search` do.
+        Whether to add the fits that trade viscous friction for lag, as `search` does.
 
     Raises
     ------

@@ -41,10 +41,10 @@ _OTHERS = {
     "start_position": "the initial stem position",
     ROUNDING: "the force within one step of the converter",
 }
-"""Words of the sources of doubt that are no imperfections."""
+"""Words for the sources of uncertainty that are not imperfections."""
 
 _SHARE = 0.2
-"""Share of the variance from which on a source is named."""
+"""Share of the variance above which a source is named."""
 
 
 def _deviation(fit: PosteriorFit, name: str) -> float:
@@ -70,13 +70,13 @@ def _size(name: str, value: float) -> str:
 
 
 def slips(fit: PosteriorFit) -> bool:
-    """Return whether F_s lies above F_c by more than what chance and its bound at F_c explain."""
+    """Return whether F_s lies above F_c by more than chance and its bound at F_c explain."""
     static = fit.at["coulomb_friction"] + fit.at["slip_force"]
     return fit.at["slip_force"] > max(_SURE * _deviation(fit, "slip_force"), _LEAST_SLIP * static)
 
 
 def found_imperfections(fit: PosteriorFit) -> tuple[str, ...]:
-    """Return a sentence for each imperfection that surely is there, the surest first."""
+    """Return a sentence for each imperfection that is certain, the most certain first."""
     found = []
     for name in fit.names:
         if name == "slip_force" and not slips(fit):
@@ -92,7 +92,7 @@ def found_imperfections(fit: PosteriorFit) -> tuple[str, ...]:
 def main_doubt(budget: Budget, width: str) -> str:
     """Name what makes an interval wide: the imperfections that the record leaves open.
 
-    `width` are the words of `interval_share`.
+    `width` is the text of `interval_share`.
     """
     total = sum(source**2 for source in budget.sources.values()) + budget.record**2
     named = [
@@ -116,7 +116,7 @@ def late_sensor(name: str, value: float) -> str:
 
 
 def by_stretch(used: float, motion: float) -> str:
-    """Return how much of the motion in a long record was used, both s."""
+    """Say how much of the motion in a long record was used, both in s."""
     return (
         f"used the {used / 60:.3g} min with the most stem travel out of {motion / 60:.3g} min of "
         "motion"
@@ -124,5 +124,5 @@ def by_stretch(used: float, motion: float) -> str:
 
 
 def by_departures(count: int) -> str:
-    """Return from how many departures of the stem F_s comes."""
+    """Say from how many departures of the stem F_s is taken."""
     return f"the static friction is taken from {count} breakaways of the stem from rest"

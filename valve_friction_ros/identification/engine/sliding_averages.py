@@ -31,23 +31,23 @@ _Array = NDArray[np.float64]
 
 _FEWEST, _FEWEST_EACH_WAY = 20, 6
 _MOST = 4000
-"""Averages that a regression needs, in all and of each direction, and takes at most."""
+"""Averages that a regression needs, in all and in each direction, and the most that it takes."""
 
 _SLIDES = 0.02
 _SURELY = 3.0
 _NOISE_OF_SPEED = 0.1
-"""The stem slides above this share of twice the mean speed, and so many deviations of the speed's
-noise, which may be at most this share of twice the mean speed."""
+"""Speed above which the stem slides, as a share of twice the mean speed and in deviations of the
+speed's noise; and the largest such noise, as a share of twice the mean speed."""
 
 _OF_STOPS = 3e-3
-"""Share of the travel next to a stop where nothing is taken: the stop carries force there."""
+"""Share of the travel next to a stop that is left out: the stop carries force there."""
 
 _FEW_PAUSES, _PAUSE = 0.05, 3.0
-"""A signal is sent on change if more than that share of its pauses are so many times the usual."""
+"""A signal is sent on change if more than this share of its pauses are so many times the usual."""
 
 _MARGIN = 2.0
-"""Distance of an average from a rest or a reversal, in its own lengths, at which it surely is of a
-sliding stem."""
+"""Distance of an average from a rest or a reversal, in averaging lengths, at which the stem surely
+slides."""
 
 _TINY = float(np.finfo(float).tiny)
 WORK_LAGS: _Array = LAGS[::10]
@@ -62,7 +62,7 @@ _STROKE_NOISE, _STROKE = 6.0, 0.03
 the stem's noise and as a share of its range: a wandering sensor, or its last bit, moves no stem."""
 
 _SURE_STROKE = 3.0
-"""Length of a stroke over the least from which on it surely is one."""
+"""Length of a run, over the least stroke, above which it is surely a stroke."""
 
 _END_NOISE = 3e-3
 """Noise over the range that may be left at the ends of the strokes.
@@ -71,18 +71,18 @@ Noise that lasts is alike in both halves of the samples, and lengthens each stro
 deviations."""
 
 FINEST_STEP, _SHARED = 4e-3, 4
-"""Time, s, over which the stem is averaged at least for that; and samples that share what they
+"""Least time, s, over which the stem is averaged for that; and samples that share what they
 average."""
 
 _STUCK = 5
-"""Equal samples from which on noise does not carry a signal across the steps of its converter."""
+"""Equal samples that show that noise does not carry a signal across the steps of its converter."""
 
 _COVERED = 0.7
-"""Least share of the distance that a stem has left after averaging, else it turns round within."""
+"""Least share of the distance that remains after averaging; else the stem reverses within."""
 
 _SLOWER, _KEPT, _LASTS = 4, 0.95, 2e-3
-"""Averages over so many times the averaging time tell noise that lasts from motion, where they
-leave that share of the distance; and the share of it without work from which noise lasts.
+"""Averages over this many averaging times separate lasting noise from motion, where they leave this
+share of the distance; and the share of it without work above which noise lasts.
 
 In eight drawn records without such noise it was 0.1 % at most, in four with it 0.3 to 3 %."""
 
@@ -99,9 +99,9 @@ def averaged_twice(signal: _Array, length: int) -> _Array:
 
 
 def turns_of(seen: _Array, least: float) -> NDArray[np.intp]:
-    """Return the places where a stem ends strokes of at least that length, m, first and last too.
+    """Return the samples at which strokes of at least that length, m, end, first and last too.
 
-    One that nowhere moves so far has a single stroke.
+    A stem that nowhere moves so far has a single stroke.
     """
     turns = np.flatnonzero(np.diff(np.sign(np.diff(seen)))) + 1
     ends, way = [0], 0
@@ -126,8 +126,8 @@ def turns_of(seen: _Array, least: float) -> NDArray[np.intp]:
 def _lengths(seen: _Array, measured: _Array, turns: NDArray[np.intp]) -> _Array:
     """Return the length of each stroke, m.
 
-    The strokes end where the one half of the samples, `seen`, turns round, and are as long as the
-    other half says: noise makes the extremes of a half, and not the other's values there.
+    The strokes end where one half of the samples, `seen`, reverses, and their lengths come from the
+    other half: noise makes the extremes of one half, but not the values of the other there.
     """
     return np.asarray(np.diff(measured[turns]) * np.sign(np.diff(seen[turns])))
 
@@ -142,7 +142,7 @@ class MeasuredSignal(NamedTuple):
 
     @classmethod
     def of(cls, signal: StampedSignal, scale: float, zero: float) -> "MeasuredSignal":
-        """Take a signal times a scale, less a zero; each repeated value once."""
+        """Scale a signal and subtract a zero; each repeated value is used once."""
         fresh = without_repeats(signal)
         noise = abs(scale) * stamped_noise(fresh)
         return cls(fresh.time, scale * fresh.value - zero, noise, fresh.period)
@@ -150,7 +150,7 @@ class MeasuredSignal(NamedTuple):
     def halves(self, grid: _Array) -> list[_Array]:
         """Return even and odd samples on a grid, averaged where it is coarser than they are.
 
-        Of a signal that is sent on change each sample is needed: both halves are the whole then.
+        A signal that is sent on change needs each sample: both halves are then the whole signal.
         """
         length = int((grid[1] - grid[0]) / self.period)
         pauses = np.diff(self.time)
@@ -182,7 +182,7 @@ class _Path(NamedTuple):
         """Return the distance that the work confirms; `slower` is averaged over a longer time.
 
         Noise that such averages share lengthens every stroke at its ends, and the force does no
-        work there; a fast move adds as much work as its distance tells.
+        work there; a fast move adds work in proportion to its distance.
         """
         extra = self.distance - slower.distance
         if not (extra > 0.0 and slower.work > 0.0):
@@ -194,11 +194,11 @@ class _Path(NamedTuple):
 
 
 class Averages(NamedTuple):
-    """What the regression takes of a record at one averaging time; two halves where there are two.
+    """Averages of a record for a regression at one averaging time, in two halves where possible.
 
     `taken` are the indices of the averages of a stem that surely slides; `is_free` says where it is
-    away from the stops and from both ends of the record. `path` is that of the averages there, and
-    `finest` that of averages as short as noise allows.
+    away from the stops and from both ends of the record. `path` is the path of the averages there,
+    and `finest` that of averages as short as noise allows.
     """
 
     time: _Array
@@ -221,8 +221,8 @@ class Averages(NamedTuple):
     def distance_with_work(self, noise: float) -> tuple[_Path, float]:
         """Return the path that the work confirms, and the mean speed over it where noise lasts.
 
-        That speed, m/s, is by averages so long that noise makes none; nan elsewhere, as they may
-        lose fast moves. `noise`, m, is that of the stem.
+        That speed, m/s, is from averages so long that noise adds nothing to it; nan elsewhere, as
+        they may lose fast moves. `noise`, m, is the noise of the stem.
         """
         length, free = _SLOWER * self.length, self.is_free
         calm = [averaged_twice(half[free], length) for half in self.position]
@@ -240,7 +240,7 @@ class Averages(NamedTuple):
 def averages_of(
     force: MeasuredSignal, stem: MeasuredSignal, valve: Valve, averaging_time: float
 ) -> Averages | None:
-    """Average a record; None where it leaves too little of a stem that surely slides."""
+    """Average a record; None where too few averages are of a stem that surely slides."""
     begin, end = max(force.time[0], stem.time[0]), min(force.time[-1], stem.time[-1])
     step = max(min(force.period, stem.period), averaging_time / 24.0)
     time = np.arange(begin, end, step)
@@ -303,7 +303,7 @@ def _finest_path(
 ) -> _Path:
     """Return the distance where the stem is free, averaged until the ends of strokes are sure.
 
-    That is over the time `longest`, s, at most.
+    The averaging time is at most `longest`, s.
     """
 
     def is_free(grid: _Array) -> NDArray[np.bool_]:
@@ -322,9 +322,9 @@ def quiet_grid(
 ) -> tuple[_Array, list[_Array]]:
     """Return the finest grid on which the noise of the stem leaves the ends of strokes sure.
 
-    Beside it even and odd samples of the stem, m, averaged from one point to the next. The grid
-    lies `between` two times, s, its period is below `longest`, s, and the noise is that where the
-    stem `is_free`.
+    With it come the even and odd samples of the stem, m, averaged from one point to the next. The
+    grid lies `between` two times, s, its period is below `longest`, s, and the noise is measured
+    where the stem `is_free`.
     """
     period = max(stem.period, FINEST_STEP)
     while True:
@@ -341,7 +341,7 @@ def quiet_grid(
 def _path(halves: Sequence[_Array], force: _Array, noise: float) -> _Path:
     """Return the distance of all strokes.
 
-    Short ones may be of a sensor that wanders: in these the force does no work.
+    Short strokes may come from a sensor that wanders: in these the force does no work.
     """
     even, odd = halves
     least = least_stroke(even, noise)
@@ -362,12 +362,12 @@ def _path(halves: Sequence[_Array], force: _Array, noise: float) -> _Path:
 
 
 def least_stroke(position: _Array, noise: float) -> float:
-    """Return the least length of a stroke, m, of a stem whose sensor has that noise, m."""
+    """Return the least length of a stroke, m, of a stem whose sensor has this noise, m."""
     return max(_STROKE_NOISE * noise, _STROKE * float(np.ptp(position)))
 
 
 def _off_line(force: _Array, position: _Array) -> _Array:
-    """Return a force less its straight line along the travel."""
+    """Return a force minus its straight-line fit along the travel."""
     away, force = position - np.mean(position), force - np.mean(force)
     square = max(float(away @ away), _TINY)
     return np.asarray(force - float(away @ force) / square * away)
@@ -376,8 +376,8 @@ def _off_line(force: _Array, position: _Array) -> _Array:
 def _lasting_noise(position: _Array) -> float:
     """Return the deviation of what is not motion in every fourth sample, which averages share.
 
-    That of fourth differences, to which even fast swings add little; those of white noise of the
-    deviation s have √70·s.
+    It comes from fourth differences, to which even fast swings add little; for white noise of the
+    deviation s theirs is √70·s.
     """
     fourth = np.abs(np.diff(position[::_SHARED], _SHARED))
     return float(np.median(fourth)) / (MEDIAN_MAGNITUDE * math.sqrt(70.0)) if fourth.size else 0.0
@@ -387,10 +387,10 @@ class Work(NamedTuple):
     """The work of the measured force, averaged as little as its noise allows.
 
     Averages lose the work of fast moves. `along` are the moves over the distance of all strokes;
-    noise in them is not that of the force, so that it biases nothing. `noise`, N, is what chance
-    makes of the work, half of what averaging over twice the time does, and what is open of the
-    distance; `rounding`, N, what the converter of the force does. `speed` is the mean one over the
-    distance, m/s, by the product of two halves of the samples.
+    their noise is independent of that of the force, so it biases nothing. `noise`, N, combines the
+    effect of chance on the work, half the effect of averaging over twice the time, and the
+    uncertainty of the distance; `rounding`, N, is the effect of the force's converter. `speed` is
+    the mean speed over the distance, m/s, from the product of two halves of the samples.
     """
 
     time: _Array
@@ -437,12 +437,12 @@ class Work(NamedTuple):
 
     @property
     def of_friction(self) -> float:
-        """The work over the distance, N, but for a straight line of the force along the travel."""
+        """The work per distance, N, without a straight line of the force along the travel."""
         moving = self.along != 0.0
         return float(self.along[moving] @ _off_line(self.force[moving], self.position[moving]))
 
     def seen_late(self) -> "Work":
-        """Compute the work over the distance, N, if the stem is seen late by each of the lags."""
+        """Compute the work per distance, N, if the stem is seen late by each of the lags."""
         seen = [
             float(self.along @ np.interp(self.time - lag, self.time, self.force))
             for lag in WORK_LAGS
@@ -454,7 +454,7 @@ def work_of_rounding(force: MeasuredSignal, time: _Array, along: _Array) -> floa
     """Return the deviation, N, that the converter of the force makes of its work over the distance.
 
     A force that stays within one step of the converter is off by the same part of the step
-    throughout, which no averaging removes; likewise whenever it comes back there the same way.
+    throughout, which no averaging removes; and again whenever it returns there from the same side.
     """
     step = quantisation_step(force.value)
     if step == 0.0:
@@ -474,8 +474,8 @@ def _squares(
 ) -> float:
     """Return the sum of the squares of all steps of a stem on a grid, m².
 
-    It is that of the products of both halves, averaged as little as their noise allows; over the
-    `longest` number of samples where there are no two halves, whose noise would not cancel.
+    The squares are products of both halves, averaged as little as their noise allows. Without two
+    halves the noise would not cancel: the average is then over the `longest` number of samples.
     """
     step, halves = float(time[1] - time[0]), stem.halves(time)
     length = max(int(longest), 1) if halves[0] is halves[1] else 1

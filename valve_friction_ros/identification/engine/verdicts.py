@@ -59,16 +59,16 @@ _DOUBTS = {
     Doubt.UNTRIED: "the search ended before it tried other lags: use a shorter record",
 }
 _FAILED = 100.0
-"""Inflation of the residual beyond which nothing that only the simulation knows is reported: ten
+"""Inflation of the residual beyond which no number that only the simulation gives is reported: ten
 times the noise."""
 
 _FURTHER, _BELOW_TOP = 0.35, 0.95
-"""Half width over F_c of what it may fall further beyond the speeds of a slow record: of packings
-that slip, F_s is up to twice F_c, and half of all packings slip. And the share of its way that the
-stem goes more slowly than its top speed: a short peak tells no friction."""
+"""Half width, over F_c, of its further fall beyond the speeds of a slow record: in packings that
+slip, F_s is up to twice F_c, and half of all packings slip. And the share of the distance below the
+top speed: a short peak shows no friction."""
 
 _BY_SPEED = ("coulomb_friction", "viscous_friction", "static_friction", "stribeck_velocity")
-"""What a friction that falls with speed has in other proportions at higher speeds."""
+"""Numbers into which a friction that falls with speed divides differently at higher speeds."""
 
 _EXTRAPOLATED = (
     "it lies outside the stroke recorded, and the spring is not identified well "
@@ -77,11 +77,11 @@ _EXTRAPOLATED = (
 
 _UNCONFIRMED = "it follows from the forces alone and is not confirmed by simulation"
 _OF_THE_BALANCE = (SLIDING, "spring_constant", "spring_preload")
-"""What the force balance of the sliding stem determines without a simulation."""
+"""Numbers that the force balance of the sliding stem determines without a simulation."""
 
 _OF_SLIP = ("static_friction", "stribeck_velocity")
-"""What a simulation tells by the forces at which its stem leaves a rest, though its residual be
-more than noise of a sensor that is not quite white."""
+"""Numbers that a simulation determines by the forces at which its stem leaves a rest, even if the
+noise of the sensor is not quite white."""
 
 _NOISE_SHARE, _LEAST = 0.2, 2e-4
 """Shares of the stem's noise and of its range in the misfit that is tolerated on a bench.
@@ -96,11 +96,10 @@ def fit_misfit(
 ) -> Misfit:
     """Return how well the simulated stem follows the measured one.
 
-    The model of a plant is doubted only where its misfit is more than noise and the friction stays
-    uncertain: where the interval of the sliding friction is wider than twice `USABLE`. That of a
-    bench is doubted where its misfit is more than what the noise of the pressure does to the
-    simulated stem, by the difference of both halves, and small shares of the stem's noise and
-    range.
+    The model of a plant is doubted only where its misfit exceeds noise and the friction stays
+    uncertain: where the interval of the sliding friction is wider than twice `USABLE`. The model of
+    a bench is doubted where its misfit exceeds the effect of pressure noise on the simulated stem,
+    by the difference of both halves, plus small shares of the stem's noise and range.
     """
     record = fit.model.record
     rms = float(np.sqrt(np.mean(fit.residual**2)))
@@ -132,9 +131,9 @@ def fit_verdicts(
 ) -> dict[str, Parameter]:
     """Return every reported number of the first fit with its verdict.
 
-    Where the model is doubted none is more than weak. Where the misfit of a plant is more than
-    noise, or the search ended before it tried other lags, what the force balance gives
-    (`checked_by_curve`) may be identified all the same.
+    Where the model is doubted, no number is more than weak. Where the misfit of a plant exceeds
+    noise, or the search ended before it tried other lags, the numbers of the force balance
+    (`checked_by_curve`) may still be identified.
     """
     fit, doubt = fits[0], ""
     force_range = float(np.ptp(fit.model.record.force))
@@ -170,7 +169,7 @@ def fit_verdicts(
 
 
 def _no_surer_than_its_spring(verdicts: dict[str, Parameter]) -> dict[str, Parameter]:
-    """Return the verdicts, with a preload that is identified only where the spring is known.
+    """Return the verdicts, with the preload identified only where the spring is known.
 
     In three draws 832 of 836 preloads whose spring was identified too lay inside their intervals;
     of 52 others 48, and two were far off.
@@ -185,7 +184,7 @@ def _no_surer_than_its_spring(verdicts: dict[str, Parameter]) -> dict[str, Param
 
 
 def _split_doubt(fits: Sequence[PosteriorFit], misfit: Misfit, profile: Profile) -> str:
-    """Return why only what the force balance determines too can be identified, or nothing."""
+    """Return why only numbers that the force balance determines too can be identified, if so."""
     doubt = doubt_of(fits, profile)
     if doubt is None:
         return ""
@@ -237,9 +236,9 @@ def curve_verdicts(
 ) -> dict[str, Parameter]:
     """Return every reported number of a force balance with its verdict.
 
-    Mass, spring, preload and sliding friction may be identified. What the sliding friction is made
-    of is at most weak, as no simulated stem confirms it. A preload may be small against the
-    `force_range` of the record, N.
+    Mass, spring, preload and sliding friction may be identified. The components of the sliding
+    friction are at most weak, as no simulated stem confirms them. A preload that is small against
+    the `force_range` of the record, N, is judged by that range.
     """
     verdicts = {}
     for name in (*UNITS, SLIDING):
@@ -264,14 +263,14 @@ def curve_verdicts(
 
 
 def _top_speed(fit: PosteriorFit) -> float:
-    """Return the speed above which the stem goes a twentieth of its way, m/s."""
+    """Return the speed above which the stem covers a twentieth of its distance, m/s."""
     speed = np.sort(fit.model.record.slow.speed)
     distance = np.cumsum(speed)
     return float(speed[np.searchsorted(distance, _BELOW_TOP * distance[-1])])
 
 
 def _slow_doubt(top: float) -> str:
-    """Return that the record is too slow to separate F_c from friction at low speed, or nothing."""
+    """Say that the record is too slow to separate F_c from friction at low speed, or nothing."""
     if top >= FALL_SPEED:
         return ""
     return (

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""How much each reading counts: noise of both sensors, and misfit that lasts."""
+"""Weight of each reading: noise of both sensors, and misfit that lasts."""
 
 import math
 
@@ -24,10 +24,10 @@ _FEWEST_BLOCKS = 8
 def reading_weights(record: FittedRecord, spring_constant: float) -> NDArray[np.float64]:
     """Return one over the effective deviation of each cell, 1/m.
 
-    The noise of the stem is white: s_x²/n in a cell of n samples. That of the smoothed force, of
-    variance s_F², moves the stem by s_F/k, and all cells alike that it lasts over: those of the
-    smoothing window, or of a rest, which keeps what the stem had when it stopped. L such cells
-    count as one if each has the variance s_x²/n + L·s_F²/k².
+    The noise of the stem is white: s_x²/n in a cell of n samples. The noise of the smoothed force,
+    of variance s_F², moves the stem by s_F/k, equally in all cells over which it lasts: those of
+    the smoothing window, or of a rest, which keeps the error at the stop. L such cells have the
+    weight of one if each has the variance s_x²/n + L·s_F²/k².
     """
     still = record.still[np.rint(record.cells).astype(np.intp)]
     lasting = np.full(still.size, record.memory)
@@ -53,9 +53,9 @@ def stroke_cells(record: FittedRecord) -> int:
 def inflation(scaled: NDArray[np.float64], stroke: int) -> float:
     """Return the variance of the mean of scaled residuals over that of independent ones, ≥ 1.
 
-    Blocks of 1, 2, 4 … cells up to a stroke are averaged; the largest product of their length and
-    the mean square of their averages counts. It is 1 for noise as it was foreseen, and grows with
-    the size of a misfit as with the time that it lasts.
+    Blocks of 1, 2, 4 … cells up to a stroke are averaged; the result is the largest product of
+    their length and the mean square of their averages. It is 1 for noise as foreseen, and grows
+    with the size and the duration of a misfit.
     """
     largest, length = max(float(np.mean(scaled**2)), 1.0), 2
     while length <= stroke and scaled.size // length >= _FEWEST_BLOCKS:

@@ -354,7 +354,7 @@ def _steady_instants(run: NDArray[np.float64]) -> NDArray[np.intp]:
 def _breakaway(
     recording: Recording, valve: Valve, places: tuple[int, int, int], window: int
 ) -> BreakawayPoint | None:
-    """Locate the onset of a stroke from the samples at which rest and stroke begin and it ends.
+    """Locate the onset of a stroke, from the first samples of its rest and motion, and its end.
 
     A derivative window shows a jump half its length too early, so the fit is half a window longer.
     """

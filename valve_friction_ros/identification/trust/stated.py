@@ -33,9 +33,7 @@ _WIDTHS = 2.0
 _DIFFERENT = 0.15
 """Difference, in half widths and as a share of the stated value, beyond which numbers contradict.
 
-Both must be exceeded.
-
-Chosen: springs of a catalogue are made to ±10 %."""
+Both are exceeded then. Chosen: springs of a catalogue are made to ±10 %."""
 
 _UNITS = {"diaphragm_area": "m²", "travel": "m"}
 _UNITS |= dict.fromkeys(("pressure_reference", "pressure_minimum", "pressure_maximum"), "Pa")
@@ -182,7 +180,7 @@ def _of_factor(
 
 
 def _of_preload(one: Parameter, stated: float, scale: float, valve: Valve) -> Contradiction:
-    """Distinguish an offset of one atmosphere from another preload; `scale` is of all forces."""
+    """Distinguish an offset of one atmosphere from another preload; `scale` scales all forces."""
     if valve.diaphragm_area is None:
         return Contradiction(one.name, stated, one.value, Cause.OTHER_PRELOAD)
     pressure = (one.value - scale * stated) / valve.diaphragm_area
