@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Health of a valve: its baseline, its diagnosis, and the monitor of one valve; no ROS."""
+"""Health of a valve: baseline, diagnosis, alarms and the monitor of one valve; no ROS."""
 
 from valve_friction_ros.health.alarm_conditions import (
     Delay as Delay,

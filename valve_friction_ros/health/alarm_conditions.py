@@ -7,11 +7,11 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""When a valve shows an alarm, and when it shows it no longer, so that no alarm flickers.
+"""When the condition of an alarm comes and goes, with hysteresis against flicker.
 
-What has an interval is judged by it: a level is reached as `friction_state` says, and left where
-the whole interval lies on the other side of its limit, so that the width of the interval is the
-hysteresis. What has none, as a missing input, is held for a time.
+A number with an interval is judged by it. It reaches a level as `friction_state` defines, and
+leaves it once the whole interval lies on the other side of the limit: the width of the interval is
+the hysteresis. A condition without an interval, such as a missing input, is delayed.
 """
 
 import math
@@ -28,12 +28,12 @@ from valve_friction_ros.health.measured import Measured
 
 _YEAR = 365.25 * 86_400e9
 _A_YEAR = 0.01
-"""False changes a year that a friction at its limit may make, by whichever of its looks. Chosen: a
-valve that stays as it is then raises at most one alarm a year, also half an interval from it."""
+"""False changes of level per year of a friction at its limit, over all its looks. Chosen: an
+unchanged valve then raises at most one alarm per year, even half an interval from the limit."""
 _TAIL = 0.025
 """Probability that a number lies above its 95 % interval."""
 _SURELY = 1.5
-"""Half widths by which friction has surely changed, as in `friction_state`."""
+"""Half widths from which friction has surely changed, as in `friction_state`."""
 _NORMAL = NormalDist()
 _QUANTILE = _NORMAL.inv_cdf(1 - _TAIL)
 
@@ -41,9 +41,9 @@ _QUANTILE = _NORMAL.inv_cdf(1 - _TAIL)
 def widening(elapsed: float) -> float:
     """Return how much wider than at 95 % an interval must be for a look to change an alarm.
 
-    Each look may err, and a valve that is looked at more often errs more often. So a look may use
-    up the share of a year's false changes that belongs to the time since the look before it, ns;
-    never more than its 95 % interval allows.
+    Each look may err, and more frequent looks err more often. A look may therefore use up only the
+    share of a year's false changes that belongs to the time since the previous look, `elapsed`, ns.
+    It never uses more than its 95 % interval allows.
     """
     if not elapsed > 0:
         return math.inf
@@ -59,7 +59,7 @@ def held_level(
     Parameters
     ----------
     held : Level
-        The level before it.
+        The level before the look.
     ratio : Ratio
         Friction over its baseline with its 95 % interval.
     side : Side
@@ -67,14 +67,14 @@ def held_level(
     limits : FrictionLimits
         The limits of the levels.
     wider : float
-        How much wider the interval is taken, in its logarithm (`widening`).
+        Factor by which the interval is widened, in its logarithm (`widening`).
 
     Returns
     -------
     Level
-        The level nearest to `held` among those from that which is surely reached to that which is
-        possible, as part of the interval lies beyond its limit. At a width of 1 the sure one is
-        that of `friction_state`; a wider interval takes as much more from a warning as from an
+        The level nearest to `held` between the sure level and the possible level. A level is
+        possible where part of the interval lies beyond its limit. At a `wider` of 1 the sure level
+        agrees with `friction_state`. A wider interval demands as much more of a warning as of an
         error.
     """
     if not (ratio.value > 0 and ratio.low > 0) or math.isinf(wider):
@@ -107,19 +107,19 @@ _BY_SIDE = {
 
 @dataclass(frozen=True)
 class FrictionHold:
-    """What the looks at the friction of a valve have shown so far, of both sides.
+    """The conditions that the looks at the friction of a valve have shown so far, on both sides.
 
-    A look is an identification, or the moves in service up to a time; whichever is newer counts,
-    so that each of the two raises an alarm and clears it.
+    A look is an identification, or the moves in service up to a time. The newer of the two decides,
+    so that either can raise an alarm and clear it.
 
     Attributes
     ----------
     conditions : mapping of Side to Condition
-        What the valve shows of each side.
+        The condition on each side.
     until : int or None
-        Time up to which its friction was looked at, ns since 1970 (UTC); None: never in this run.
+        Time of the latest look, ns since 1970 (UTC); None before the first look of this run.
     basis : object
-        What the friction is compared with: another baseline, limit or packing begins anew.
+        What the friction is compared with. A new baseline, limit or packing resets the conditions.
     """
 
     conditions: Mapping[Side, Condition] = field(default_factory=dict)
@@ -127,14 +127,14 @@ class FrictionHold:
     basis: Hashable = None
 
     def __post_init__(self) -> None:
-        """Hold a condition of each side, behind a view that cannot be written."""
+        """Complete the conditions of both sides and make them read-only."""
         both = {side: self.conditions.get(side, NO_CONDITION) for side in Side}
         object.__setattr__(self, "conditions", MappingProxyType(both))
 
     def based_on(self, basis: Hashable) -> "FrictionHold":
-        """Compare with something else from now on; what was shown by the former is forgotten.
+        """Change the basis of comparison; a new basis resets the conditions.
 
-        The first basis of a run leaves what an earlier run has shown.
+        The first basis of a run keeps the conditions of an earlier run.
         """
         if self.basis is None:
             return replace(self, basis=basis)
@@ -143,10 +143,10 @@ class FrictionHold:
     def looked(
         self, diagnosis: Diagnosis, time: int, limits: FrictionLimits, elapsed: int | None = None
     ) -> "FrictionHold":
-        """Take a look at the friction of a time, ns; one of before the latest look changes nothing.
+        """Take a look at the friction at a time, ns; a look older than the latest changes nothing.
 
-        A diagnosis that compares nothing leaves the conditions as they are. The time since the look
-        before, ns, is `elapsed`, where stamps do not tell: a record may be played again.
+        A diagnosis that compares nothing leaves the conditions as they are. Give `elapsed`, the
+        time since the previous look in ns, where stamps do not show it: a record may be replayed.
         """
         if elapsed is None and self.until is not None:
             elapsed = time - self.until
@@ -172,9 +172,9 @@ class FrictionHold:
 
 
 def farthest(now: Mapping[str, Measured], healthy: Mapping[str, Measured]) -> dict[str, Measured]:
-    """Return the numbers of a valve at the ends of their intervals that are farthest from healthy.
+    """Return each number of a valve at the end of its interval that is farthest from healthy.
 
-    What is not found by these is surely not there, so that an alarm on the whole valve ends.
+    A change that these do not show is surely absent, and the alarm on the whole valve ends.
     """
     found = dict(now)
     for name in now.keys() & healthy.keys():
@@ -185,7 +185,7 @@ def farthest(now: Mapping[str, Measured], healthy: Mapping[str, Measured]) -> di
 
 
 def shown_by(findings: Iterable[Finding]) -> Condition:
-    """Return what findings show together: the level of the most severe, and all they say."""
+    """Return the condition of several findings: the highest level, and all messages."""
     some = [one for one in by_severity(findings) if one.level > Level.OK]
     if not some:
         return NO_CONDITION
@@ -194,16 +194,16 @@ def shown_by(findings: Iterable[Finding]) -> Condition:
 
 @dataclass(frozen=True)
 class Delay:
-    """A condition without an interval, which is held for a time.
+    """On-delay and off-delay of a condition without an interval.
 
     Attributes
     ----------
     rise, fall : float
-        Time, s, for which a level must be there, or gone, until it is shown, or not any more.
+        On-delay and off-delay, s: how long a level must last before it is shown, or dropped.
     shown : Condition
-        What is shown now.
+        The condition shown now.
     since : float or None
-        From when it has been otherwise, s; None while it is as shown.
+        When the level began to differ from the one shown, s; None while both agree.
     """
 
     rise: float
@@ -212,7 +212,7 @@ class Delay:
     since: float | None = None
 
     def seen(self, condition: Condition, now: float) -> "Delay":
-        """Take the condition of now, s of a clock that does not go back."""
+        """Take the present condition at `now`, s of a monotonic clock."""
         if condition.level == self.shown.level:
             return self if self.since is None else replace(self, since=None)
         since = now if self.since is None else self.since

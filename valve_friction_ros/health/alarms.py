@@ -7,12 +7,11 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The life of an alarm, after ISA-18.2 and IEC 62682: its states, one table of transitions, events.
+"""Life cycle of an alarm after ISA-18.2 and IEC 62682: states, transitions and events.
 
-An alarm is one of six of a valve. It has a *condition*, which the valve shows, and a *state*, which
-is what has become of the condition: raised, acknowledged by somebody, shelved, returned. Each step
-is an `AlarmEvent`, which holds the whole alarm from then on, so that the last event of an alarm is
-the alarm.
+A valve has six alarms. Each has a *condition*, which the valve shows, and a *state*, which records
+the handling of the condition: raised, acknowledged, shelved, returned. Each step is an
+`AlarmEvent`. It holds the complete alarm from then on, so the last event gives the present alarm.
 """
 
 import json
@@ -32,7 +31,7 @@ from valve_friction_ros.wording import utc_minute, utc_second
 
 
 class AlarmKind(Enum):
-    """What an alarm of a valve is about; the value is its name in files and on the graph."""
+    """Subject of an alarm; the value is its name in files and on the ROS graph."""
 
     FRICTION_HIGH = "friction_high"
     FRICTION_LOW = "friction_low"
@@ -48,34 +47,34 @@ class AlarmKind(Enum):
 
 
 class AlarmState(Enum):
-    """State of an alarm; the letters are those of the states of ISA-18.2."""
+    """State of an alarm, with the letters of ISA-18.2."""
 
     NORMAL = "normal"
-    """A: the valve does not show it, and nobody has to do anything."""
+    """A: inactive, no action required."""
     UNACKNOWLEDGED = "unacknowledged"
-    """B: the valve shows it, and nobody has acknowledged it."""
+    """B: active, not acknowledged."""
     ACKNOWLEDGED = "acknowledged"
-    """C: the valve shows it, and somebody has acknowledged it."""
+    """C: active, acknowledged."""
     RETURNED = "returned unacknowledged"
-    """D: the valve has shown it, shows it no longer, and nobody has acknowledged it."""
+    """D: returned to normal before it was acknowledged."""
     SHELVED = "shelved"
-    """G: somebody does not want to hear of it until a time."""
+    """G: suppressed by a person until a set time."""
     OUT_OF_SERVICE = "out of service"
-    """I: the valve is being worked on until a time."""
+    """I: the valve is under maintenance until a set time."""
 
     @property
     def is_suppressed(self) -> bool:
-        """Whether nobody is told, whatever the valve shows."""
+        """Whether nobody is notified, whatever the valve shows."""
         return self in (AlarmState.SHELVED, AlarmState.OUT_OF_SERVICE)
 
     @property
     def needs_answer(self) -> bool:
-        """Whether it waits for somebody to acknowledge it."""
+        """Whether it waits for an acknowledgement."""
         return self in (AlarmState.UNACKNOWLEDGED, AlarmState.RETURNED)
 
 
 class AlarmAction(Enum):
-    """What moves an alarm from state to state; by the valve, the clock or a person."""
+    """Action on an alarm by the valve, the clock or a person."""
 
     RAISE = "raised"
     WORSEN = "worsened"
@@ -91,7 +90,7 @@ class AlarmAction(Enum):
 
     @property
     def is_of_person(self) -> bool:
-        """Whether a person does it, who has a name."""
+        """Whether a named person does it."""
         return self in _OF_PERSONS
 
 
@@ -148,30 +147,30 @@ def _table() -> Mapping[tuple[AlarmState, AlarmAction], AlarmState | None]:
 
 
 TRANSITIONS = _table()
-"""The state after each action that is possible in a state.
+"""The state after each action that a state allows.
 
-None: the condition decides, which is unacknowledged where the valve shows it and normal where not.
+None: the condition decides; unacknowledged where it is active, else normal.
 """
 
 _HOUR = 3_600_000_000_000
 LONGEST_SHELVING = 30 * 24 * _HOUR
-"""Longest time, ns, for which an alarm is shelved. Chosen: what is forgotten comes back."""
+"""Longest time of shelving, ns. Chosen: a forgotten alarm comes back."""
 LONGEST_ABSENCE = 366 * 24 * _HOUR
 """Longest time, ns, out of service. Chosen: a turnaround is planned for less than a year ahead."""
 _LONGEST_NAME, _LONGEST_TEXT = 80, 500
 
 
 class AlarmError(ValueError):
-    """A request that an alarm refuses; one line for the person who made it."""
+    """A refused request, explained in one line to the person who made it."""
 
 
 class Condition(NamedTuple):
-    """What the valve shows of an alarm now.
+    """The present condition of an alarm.
 
     Attributes
     ----------
     level : Level
-        OK where it does not show it.
+        Severity; OK where it is inactive.
     status_signal : StatusSignal
         The severity as a status signal of NE 107.
     message : str
@@ -188,22 +187,22 @@ NO_CONDITION = Condition()
 
 @dataclass(frozen=True)
 class Alarm:
-    """An alarm as it is from its last event on.
+    """An alarm since its last event.
 
     Attributes
     ----------
     kind : AlarmKind
-        What it is about.
+        Its subject.
     state : AlarmState
         Its state.
     condition : Condition
-        What the valve shows, also while it is shelved; of one that has returned, nothing.
+        The condition that the valve shows, also while the alarm is shelved; inactive once returned.
     raised : int or None
-        When the valve began to show it, ns since 1970 (UTC); None where it never has.
+        When it was last raised, ns since 1970 (UTC); None if never.
     until : int or None
         End of shelving or absence, ns; None in the other states.
     message : str
-        The sentence of the condition when it was raised or changed last.
+        The message of the condition when it was raised or last changed level.
 
     Raises
     ------
@@ -228,16 +227,16 @@ class Alarm:
 
     @property
     def is_active(self) -> bool:
-        """Whether the valve shows it now."""
+        """Whether its condition is active."""
         return self.condition.level > Level.OK
 
     @property
     def is_told(self) -> bool:
-        """Whether people are told of it: the valve shows it, and nobody has shelved it."""
+        """Whether people are notified of it: it is active and not suppressed."""
         return self.is_active and not self.state.is_suppressed
 
     def __str__(self) -> str:
-        """Return kind and state, with the end of a suppression, on one line."""
+        """Return kind, state and end of a suppression on one line."""
         end = "" if self.until is None else f" until {utc_minute(self.until)}"
         return f"{self.kind.words}: {self.state.value}{end}"
 
@@ -254,13 +253,13 @@ class AlarmEvent(NamedTuple):
     time : int
         When, ns since 1970 (UTC).
     action : AlarmAction
-        What has happened.
+        What happened.
     before : AlarmState
         The state until then.
     alarm : Alarm
         The alarm from then on.
     who, text : str
-        The person and their words; empty where the valve or the clock did it.
+        The person and their comment; empty where the valve or the clock acted.
     """
 
     time: int
@@ -273,24 +272,24 @@ class AlarmEvent(NamedTuple):
 
 @dataclass(frozen=True)
 class AlarmRequest:
-    """What a person asks of an alarm.
+    """A person's request to an alarm.
 
     Attributes
     ----------
     action : AlarmAction
         Acknowledge, shelve, unshelve, take out of service, put back or comment.
     who : str
-        Their name.
+        Name of the person.
     text : str
-        Their words; a comment needs some.
+        Their comment; required by the action to comment.
     duration : float
-        Length of shelving or absence, s; not used by the others.
+        Length of shelving or absence, s; unused by the other actions.
 
     Raises
     ------
     AlarmError
-        If the name is empty, a text is no line of plain text, or the duration is no time that may
-        be shelved.
+        If the action is not a person's, the name is empty, a required comment is missing, a text is
+        not one line of plain text, or the duration is out of bounds.
     """
 
     action: AlarmAction
@@ -299,7 +298,7 @@ class AlarmRequest:
     duration: float = math.nan
 
     def __post_init__(self) -> None:
-        """Refuse what nobody may ask."""
+        """Refuse invalid requests."""
         if not self.action.is_of_person:
             raise AlarmError(f"an alarm is {self.action.value} by the valve, not by request")
         for name, longest in (("who", _LONGEST_NAME), ("text", _LONGEST_TEXT)):
@@ -340,14 +339,14 @@ def _stepped(alarm: Alarm, action: AlarmAction, time: int, condition: Condition)
 
 
 def followed_by(alarm: Alarm, condition: Condition, time: int) -> tuple[AlarmEvent, ...]:
-    """Return what the clock and the valve make of an alarm: nothing, or one event or two.
+    """Return the events of the clock and the valve on an alarm: none, one or two.
 
     Parameters
     ----------
     alarm : Alarm
         The alarm until now.
     condition : Condition
-        What the valve shows now.
+        The present condition.
     time : int
         Now, ns since 1970 (UTC).
     """
@@ -366,12 +365,12 @@ def followed_by(alarm: Alarm, condition: Condition, time: int) -> tuple[AlarmEve
 
 
 def requested(alarm: Alarm, request: AlarmRequest, time: int) -> AlarmEvent:
-    """Return the event of what a person asks of an alarm at a time, ns since 1970 (UTC).
+    """Return the event of a person's request at a time, ns since 1970 (UTC).
 
-    A person cannot answer an alarm before it was raised: where the clock of the valve is ahead of
-    the one that asks, the answer is of the time at which it was raised.
+    A person cannot answer an alarm before it was raised. Where the clock of the valve is ahead of
+    the requester's, the event takes the time at which the alarm was raised.
 
-    Raises AlarmError if the alarm is in a state in which that cannot be done.
+    Raises AlarmError if the state of the alarm does not allow the action.
     """
     action = request.action
     if (alarm.state, action) not in TRANSITIONS:
@@ -396,9 +395,9 @@ def requested(alarm: Alarm, request: AlarmRequest, time: int) -> AlarmEvent:
 def all_followed(
     alarms: Mapping[AlarmKind, Alarm], conditions: Mapping[AlarmKind, Condition], time: int
 ) -> tuple[AlarmEvent, ...]:
-    """Return what the clock and the valve make of its alarms (`followed_by`).
+    """Return the events of the clock and the valve on all its alarms (`followed_by`).
 
-    An alarm without a condition is followed by the clock alone.
+    Only the clock acts on an alarm that `conditions` does not name.
     """
     events: list[AlarmEvent] = []
     for kind in AlarmKind:
@@ -410,11 +409,11 @@ def all_followed(
 def all_requested(
     alarms: Mapping[AlarmKind, Alarm], kind: AlarmKind | None, request: AlarmRequest, time: int
 ) -> tuple[AlarmEvent, ...]:
-    """Return the events of what a person asks of one alarm of a valve, or of all that allow it.
+    """Return the events of a person's request to one alarm of a valve, or to all that allow it.
 
-    Of all, those are left out that are normal; they are taken out of service with the valve.
+    A request to all skips normal alarms, unless it takes the valve out of service.
 
-    Raises AlarmError if one is asked that does not allow it, or none of all does.
+    Raises AlarmError if the alarm named, or every alarm, does not allow the action.
     """
     if kind is not None:
         return (requested(alarms.get(kind, Alarm(kind)), request, time),)
@@ -433,7 +432,7 @@ def all_requested(
 
 
 def alarm_summary(alarms: Iterable[Alarm]) -> str:
-    """Say on one line which alarms are not normal; empty where all are."""
+    """Return one line with the alarms that are not normal; empty if all are normal."""
     return "; ".join(str(one) for one in alarms if one.state is not AlarmState.NORMAL)
 
 
@@ -442,16 +441,16 @@ _DAY = 86_400.0
 
 @dataclass(frozen=True)
 class AlarmDigest:
-    """The alarms of valves at a time, as one letter.
+    """The alarms of several valves at a time, in one message.
 
     Attributes
     ----------
     time : datetime
-        When, UTC.
+        Time, UTC.
     alarms : mapping of (str, str) to mapping of AlarmKind to Alarm
-        Alarms by tag and name of the identifier of each valve.
+        Alarms by tag and identifier name of each valve.
     event_id : str
-        The same at each try, so that a receiver counts it once.
+        The same on each delivery attempt, so that a receiver can drop duplicates.
     """
 
     time: datetime
@@ -460,15 +459,15 @@ class AlarmDigest:
 
     @property
     def new_level(self) -> None:
-        """It tells no level."""
+        """None: a digest reports no change of level."""
 
     @property
     def title(self) -> str:
-        """What it is, for whoever hears that it was not delivered."""
+        """Name of the digest in the report of a failed delivery."""
         return f"the digest of {self.time:%Y-%m-%d %H:%M:%S} UTC"
 
     def body(self) -> bytes:
-        """Return it as JSON: what stands or waits for an answer; of what is shelved, the number."""
+        """Return the active or unanswered alarms as JSON, with the number of suppressed alarms."""
         every = [
             (tag, node, alarm)
             for (tag, node), of_valve in sorted(self.alarms.items())
@@ -504,11 +503,11 @@ class AlarmDigest:
 
 
 class DigestDesk:
-    """Gathers the alarms of all valves of a process, and composes one letter a day for a receiver.
+    """Collects the alarms of all valves of a process for one daily digest per receiver.
 
-    Which valves belong together is said by a group, such as an address and an hour. What is heard
-    of a valve counts until it says otherwise. A time that goes by while nobody asks, because the
-    process is not running, is left out.
+    Valves with the same group, such as an address, and the same hour share a digest. The last
+    alarms heard of a valve hold until it sends others. A digest that falls due while the process is
+    not running is skipped.
     """
 
     def __init__(self) -> None:
@@ -524,20 +523,20 @@ class DigestDesk:
         alarms: Mapping[AlarmKind, Alarm],
         now: float,
     ) -> AlarmDigest | None:
-        """Take the alarms of a valve; return the letter where its time has come, once.
+        """Take the alarms of a valve; return the digest, once, when it is due.
 
         Parameters
         ----------
         group : hashable
-            What the receivers of a letter have in common.
+            Identifies the receivers of a digest.
         hour : float
-            Time of the letter, h since midnight, UTC; below 0: none.
+            Time of the digest, h since midnight, UTC; below 0 for no digest.
         valve : tuple of str
-            Tag, and name of the identifier.
+            Tag and identifier name.
         alarms : mapping of AlarmKind to Alarm
-            Its alarms now.
+            Its present alarms.
         now : float
-            s since 1970 (UTC).
+            Present time, s since 1970 (UTC).
         """
         key = (group, hour)
         with self._lock:
@@ -547,7 +546,7 @@ class DigestDesk:
             if hour < 0:
                 return None
             self._groups.setdefault(key, {})[valve] = dict(alarms)
-            begun = (now - 3600 * hour) // _DAY  # days, each from one letter to the next
+            begun = (now - 3600 * hour) // _DAY  # days, each from one digest to the next
             before = self._seen.get(key, begun)
             self._seen[key] = max(begun, before)
             if begun <= before:

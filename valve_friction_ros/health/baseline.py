@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The healthy valve: its friction, and what else was measured of it."""
+"""The baseline: friction and other measured numbers of the healthy valve."""
 
 import math
 from collections.abc import Mapping
@@ -21,17 +21,16 @@ from valve_friction_ros.model.checks import require_non_negative, require_positi
 from valve_friction_ros.wording import MORE_STROKES, Code, Statement, lack_words, said, sentence
 
 GOOD_SHARE, LARGEST_SHARE = 0.13, 0.33
-"""Half widths of a friction, as shares of its value, of a good baseline and of the widest.
+"""Largest half width of a friction, over its value, in a good baseline and in any baseline.
 
-With the one a friction that has grown by half, and is known no better, is still declared to have
-grown, with the other one that has doubled: ln(1.5/1.25)/√2 and ln(2/1.25)/√2, with the 1.25 of
-`FrictionLimits`."""
+A friction known to the same share is declared grown when it has grown by half, or when it has
+doubled: ln(1.5/1.25)/√2 and ln(2/1.25)/√2, with the 1.25 of `FrictionLimits`."""
 
 _OTHER_METHOD = "use a method that gives confidence intervals"
 
 
 class Lack(Enum):
-    """What is missing to a baseline."""
+    """What a baseline lacks."""
 
     RESULT = "no result"
     VALUE = "no value"
@@ -43,17 +42,17 @@ class Lack(Enum):
 
 @dataclass(frozen=True)
 class BaselineLack:
-    """A condition of a baseline that is not met.
+    """An unmet condition of a baseline.
 
     Attributes
     ----------
     of : str
-        What does not meet it: ``coulomb_friction``, ``sliding_friction``, ``moves`` in service,
+        What fails the condition: ``coulomb_friction``, ``sliding_friction``, ``moves`` in service,
         the ``result`` or the ``valve``.
     lack : Lack
         What is missing.
     share, largest : float
-        Half width over the value, and the most that a baseline may have; nan where neither counts.
+        Half width over the value, and its limit; nan where the precision is not the problem.
     """
 
     of: str
@@ -68,7 +67,7 @@ class BaselineLack:
 
     @classmethod
     def found(cls, of: str, one: Parameter, largest: float) -> "BaselineLack | None":
-        """Return what a friction lacks to be known to a share; None: nothing."""
+        """Return what a friction lacks to be known to the share `largest`, or None."""
         if math.isnan(one.value):
             return cls(of, Lack.VALUE)
         if one.value <= 0:
@@ -81,12 +80,12 @@ class BaselineLack:
 
 
 class BaselineRefusalError(RefusalError):
-    """Nothing can be the baseline; the message names cause and remedy.
+    """Refusal of a baseline; the message names cause and remedy.
 
     Attributes
     ----------
     lacks : tuple of BaselineLack
-        The conditions that are not met.
+        The unmet conditions.
     """
 
     def __init__(self, message: str, *lacks: BaselineLack) -> None:
@@ -96,7 +95,7 @@ class BaselineRefusalError(RefusalError):
 
 @dataclass(frozen=True)
 class SlidingFriction:
-    """Work of friction over the distance that the stem slides, and the speed that it belongs to.
+    """Friction work per distance of sliding, with the speed at which it was measured.
 
     Attributes
     ----------
@@ -130,27 +129,27 @@ class SlidingFriction:
 
 @dataclass(frozen=True)
 class Baseline:
-    """The healthy valve: its Coulomb friction, its sliding friction, or both; and other numbers.
+    """The healthy valve: Coulomb friction, sliding friction or both, and its other numbers.
 
-    Its intervals leave out the uncertainties of area and sensor scales, which cancel in the ratio
-    of two frictions that the same sensors measured.
+    The intervals leave out the uncertainties of area and sensor scales: these cancel in the ratio
+    of two frictions measured by the same sensors.
 
     Attributes
     ----------
     coulomb_friction : float or None
         F_c, N, above zero.
     half_width : float
-        Half the width of its 95 % interval, N; zero for a given value.
+        Half the width of its 95 % interval, N; zero for an exact value.
     sliding : SlidingFriction or None
         The sliding friction, which needs no split into F_c and F_v.
     numbers : mapping of str to Measured
-        What else its result says of the valve (`valve_numbers`); empty for a friction alone. They
-        take no part in a comparison of two baselines: the frictions tell results apart.
+        Further numbers of the valve from the same result (`valve_numbers`); empty for a friction
+        alone. Equality of baselines ignores them: the frictions distinguish results.
 
     Raises
     ------
     ValueError
-        If a value is impossible, or there is none.
+        If a value is impossible, or no friction is given.
 
     Examples
     --------
@@ -189,7 +188,7 @@ class Baseline:
 
     @property
     def remark(self) -> str:
-        """Which growth alone is certain to be declared, where it is more than by half; or ''."""
+        """The growth of friction that is sure to be declared, where it exceeds half; else ''."""
         shares = [] if self.sliding is None else [self.sliding.share]
         if self.coulomb_friction is not None:
             shares.append(self.half_width / self.coulomb_friction)
@@ -201,9 +200,9 @@ class Baseline:
 
     @classmethod
     def of(cls, result: Result) -> "Baseline":
-        """Return those frictions of a result as baseline that are known well enough (`serving`).
+        """Return a baseline of the frictions that a result knows well enough (`serving`).
 
-        Raises BaselineRefusalError if neither does; the message names why.
+        Raises BaselineRefusalError, with the reasons, if neither friction is known well enough.
         """
         frictions = _frictions(result)
         lacks = _lacks(frictions)
@@ -238,7 +237,7 @@ class Baseline:
 
     @staticmethod
     def lacks(result: Result) -> tuple[BaselineLack, ...]:
-        """Return the conditions of a baseline that a result does not meet; empty: `of` takes it."""
+        """Return the conditions of a baseline that a result fails; empty if `of` accepts it."""
         frictions = _frictions(result)
         wrong = [one.name for one in frictions.values() if one.value < 0]
         if wrong:
@@ -253,10 +252,10 @@ class Baseline:
         sliding: SlidingFriction | None,
         numbers: Mapping[str, Measured],
     ) -> "Baseline | None":
-        """Return those of two frictions as baseline that are known well enough; None without.
+        """Return a baseline of the frictions that are known well enough, or None.
 
-        They are those known to `GOOD_SHARE`. Where neither is, one serves that is known to
-        `LARGEST_SHARE`, the sliding friction first.
+        It takes each friction known to `GOOD_SHARE`. If neither is, it takes one known to
+        `LARGEST_SHARE`, preferably the sliding friction.
         """
         for largest in (GOOD_SHARE, LARGEST_SHARE):
             slid = sliding if sliding is not None and sliding.share <= largest else None

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The diagnosis by the moves of a valve in service, and the baseline that they can be."""
+"""Diagnosis and baseline from the moves of a valve in service."""
 
 import contextlib
 import math
@@ -29,21 +29,21 @@ from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.wording import Code, Statement, percentage, said
 
 _LARGEST_SPEED_RATIO = 2.0
-"""Speed over that of the baseline, or the reverse, up to which moves are compared with it.
+"""Largest ratio of the speeds of moves and baseline, either way, at which they are compared.
 
-Beyond it, the moves before say more than a baseline at another speed. Chosen."""
+Beyond it, earlier moves are a better reference than a baseline at another speed. Chosen."""
 
 
 @dataclass(frozen=True)
 class Reference:
-    """Friction of a valve when its moves were first combined, since its packing was renewed.
+    """Friction from the first combined moves of a valve with its present packing.
 
     Attributes
     ----------
     sliding : SlidingFriction
-        What the moves said.
+        Sliding friction of these moves, or carried back to before the first change.
     time : int
-        End of the last of them, ns since 1970 (UTC).
+        End of the last of these moves, or start of the first change, ns since 1970 (UTC).
     """
 
     sliding: SlidingFriction
@@ -51,7 +51,7 @@ class Reference:
 
 
 def baseline_by_evidence(evidence: Evidence) -> Baseline:
-    """Return the sliding friction of the moves as baseline.
+    """Return the sliding friction of the moves as the baseline.
 
     Raises BaselineRefusalError if it is not known to `GOOD_SHARE`.
     """
@@ -77,15 +77,15 @@ def baseline_by_evidence(evidence: Evidence) -> Baseline:
 
 
 def lack_of_moves(evidence: Evidence) -> BaselineLack | None:
-    """Return what the moves in service lack to be a baseline; None: nothing."""
+    """Return what the moves in service lack as a baseline, or None."""
     one = evidence.parameters[SLIDING].without_calibration
     return BaselineLack.found("moves", one, GOOD_SHARE)
 
 
 def reference_by_evidence(evidence: Evidence) -> Reference | None:
-    """Return what the moves say as reference; None where they could not be a baseline.
+    """Return the reference from the moves, or None where they cannot be a baseline.
 
-    Where friction has changed before it was known well enough, it is carried back over all changes.
+    If friction changed before it was known well enough, it is carried back over all changes.
     """
     with contextlib.suppress(RefusalError):
         sliding, changes = baseline_by_evidence(evidence).sliding, evidence.changes
@@ -120,9 +120,9 @@ def diagnosis_by_evidence(
     limits : FrictionLimits
         Bounds of the ratio.
     reference : Reference, optional
-        Friction when the moves were first combined, for a valve without a baseline, or with one
-        that cannot be compared (`why_not_compared`). Where this cannot be compared either, as a
-        stem that sticks more moves at other speeds, a declared change is an alarm by itself.
+        Friction of the first combined moves, for a valve without a comparable baseline
+        (`why_not_compared`). If the reference is not comparable either, for example because a stem
+        that sticks more moves at other speeds, a declared change raises an alarm by itself.
 
     Returns
     -------
@@ -149,7 +149,7 @@ def diagnosis_by_evidence(
 
 
 def _dated(effect: Statement, evidence: Evidence) -> Statement:
-    """Add when friction last changed, where the moves still show it."""
+    """Add the time of the last change of friction, where the moves still show it."""
     change = evidence.change
     if change is None:
         return effect
@@ -157,7 +157,7 @@ def _dated(effect: Statement, evidence: Evidence) -> Statement:
 
 
 def _by_change(evidence: Evidence, limits: FrictionLimits, effect: Statement) -> Diagnosis | None:
-    """Judge a declared change by itself; None where it is no alarm, for it says little else."""
+    """Judge a declared change by itself; return None unless it is an alarm."""
     change = evidence.change
     if change is None:
         return None
@@ -179,7 +179,7 @@ def _compared(evidence: Evidence, baseline: Baseline) -> Ratio | None:
 
 
 def why_not_compared(evidence: Evidence, baseline: Baseline | None) -> Statement | None:
-    """Return why known evidence is not compared with a baseline; None if it is."""
+    """Return why known evidence is not comparable with a baseline, or None if it is."""
     if baseline is None or not evidence.is_known or _compared(evidence, baseline) is not None:
         return None
     if baseline.sliding is None:

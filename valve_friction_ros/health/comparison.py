@@ -7,10 +7,10 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""How far the friction of a valve has moved away from its baseline, at equal speeds.
+"""Ratio of the friction of a valve to its baseline, at equal speeds.
 
-Two records of the same sensors share what the record does not say of the lag between the signals:
-both frictions are then wrong alike, and their ratio is known better than either.
+Two records of the same sensors share the unknown part of the lag between the signals. Both
+frictions then have the same error, and their ratio is known better than either.
 """
 
 import math
@@ -27,37 +27,37 @@ from valve_friction_ros.identification.trust.uncertainty import NORMAL_QUANTILE
 from valve_friction_ros.wording import Code, Statement, said, sentence
 
 _ALIKE = 0.9
-"""Correlation of what the lag does to two records: the same sensors, clocks and tubing, which may
-have changed a little. Chosen."""
+"""Correlation of the effect of the lag on two records: sensors, clocks and tubing are the same, but
+may have changed a little. Chosen."""
 
 _USUAL_EXPONENT, _EXPONENT_SPREAD = 0.3, 0.4
-"""Mean and standard deviation of p where friction grows as the power p of the speed: Coulomb
-friction alone has 0, viscous friction alone 1, and friction that falls with the speed less."""
+"""Mean and standard deviation of the exponent p of friction over speed: 0 for Coulomb friction
+alone, 1 for viscous friction alone, negative for friction that falls with speed."""
 
 _USUAL_FALL, _FALL_SPREAD = 0.16, 0.12
-"""Mean and standard deviation of the share of friction that a speed without limit takes from it.
+"""Mean and standard deviation of the share of friction lost at unlimited speed.
 
-Of a packing that slips exp(-(v/v_s)²) falls, between two speeds of which one is s times the other,
-by 1 - 1/s at most, to within 0.05. These four are chosen so that of drawn packings, of which half
-slip (F_s 1.15 to 2 F_c, v_s 0.3 to 5 mm/s, F_v·v 0.1 to 3 F_c), 90 to 98 % are inside."""
+Between two speeds of ratio s, the exp(-(v/v_s)²) of a packing that slips falls by at most 1 - 1/s,
+to within 0.05. These four values are chosen to hold 90 to 98 % of drawn packings, of which half
+slip (F_s 1.15 to 2 F_c, v_s 0.3 to 5 mm/s, F_v·v 0.1 to 3 F_c)."""
 
 _USUAL_BEND, _BEND_SPREAD = 0.06, 0.12
-"""Mean and standard deviation of what the square of the logarithm of two speeds' ratio adds to the
-power law whose exponent is that of the friction at one of them: of the same packings 95 % are
-between -0.13 and 0.32."""
+"""Mean and standard deviation of the quadratic coefficient, in the logarithm of the speed ratio,
+that is added to the power law tangent at one of two speeds: 95 % of the same packings lie between
+-0.13 and 0.32."""
 
 _WIDEST_STEP = math.log(1.5)
-"""Half width of the step from one speed to the other beyond which nothing is compared.
+"""Largest half width of the step from one speed to the other at which frictions are compared.
 
-A friction that may differ by half for its speed alone says little, and what it says is what is
-usual. Chosen."""
+Beyond it the speed alone may change friction by half, and the result reflects only the prior.
+Chosen."""
 
 _NOTHING: Mapping[str, Measured] = MappingProxyType({})
 _COULOMB = "coulomb_friction"
 
 
 def friction_name(name: str, speed: float) -> Statement:
-    """Return the name of a friction, with the speed, m/s, that a sliding friction belongs to."""
+    """Return the name of a friction; a sliding friction includes its speed, m/s."""
     if name == SLIDING:
         return said(Code.FRICTION_AT, of=name, speed=speed)
     return said(Code.FRICTION, of=name)
@@ -65,14 +65,14 @@ def friction_name(name: str, speed: float) -> Statement:
 
 @dataclass(frozen=True)
 class Ratio(Measured):
-    """A friction now over that of the baseline.
+    """Present friction over baseline friction.
 
     Attributes
     ----------
     of : str
-        The friction that is compared: ``sliding_friction`` or ``coulomb_friction``.
+        The compared friction: ``sliding_friction`` or ``coulomb_friction``.
     speed : float
-        Speed at which sliding frictions are compared, that of the baseline, m/s; else nan.
+        Speed of the baseline, m/s, at which sliding frictions are compared; else nan.
     """
 
     of: str = _COULOMB
@@ -80,27 +80,27 @@ class Ratio(Measured):
 
     @property
     def friction(self) -> Statement:
-        """The friction that is compared."""
+        """The compared friction, as a statement."""
         return friction_name(self.of, self.speed)
 
     @property
     def what(self) -> str:
-        """What is compared, in words."""
+        """The compared friction, in words."""
         return sentence(self.friction)
 
     @property
     def change(self) -> float:
-        """Distance of the interval from 1, as a logarithm; 0 where it holds 1, or has no ends."""
+        """Distance of the interval from 1, as a logarithm; 0 if it includes 1 or has no ends."""
         if not self.low > 0:
             return 0.0
         return max(math.log(self.low), 0.0) + min(math.log(self.high), 0.0)
 
 
 class Comparison(NamedTuple):
-    """A friction and that of the baseline, N, each with half the width of its 95 % interval.
+    """Present and baseline friction, N, each with half the width of its 95 % interval.
 
-    The intervals are those without calibration; `shared` are the parts of both half widths by
-    which the two are wrong alike.
+    The intervals leave out calibration. `shared` holds the parts of both half widths that come from
+    a common error.
     """
 
     now: tuple[float, float]
@@ -111,10 +111,10 @@ class Comparison(NamedTuple):
 
     @property
     def ratio(self) -> Ratio:
-        """Ratio of the two.
+        """Ratio of the two frictions.
 
-        The relative half widths of two independent estimates add in squares, and the interval is
-        symmetric in the logarithm, so that a ratio and its inverse have the same interval.
+        The relative half widths of independent estimates add in squares. The interval is symmetric
+        in the logarithm, so a ratio and its inverse have the same interval.
         """
         ratio = self.now[0] / self.healthy[0]
         if not ratio > 0:
@@ -130,11 +130,11 @@ class Comparison(NamedTuple):
 
     @property
     def excess(self) -> tuple[float, float]:
-        """Friction now less that of the baseline, N, and half the width of its interval."""
+        """Present less baseline friction, N, and half the width of its interval."""
         return self.now[0] - self.healthy[0], self._apart(1.0, 1.0)
 
     def _apart(self, now: float, healthy: float) -> float:
-        """Return the half width of the difference of both, each over a number."""
+        """Return the half width of the difference of both frictions, each divided by a number."""
         alike = 2.0 * _ALIKE * self.shared[0] * self.shared[1] / (now * healthy)
         whole = (self.now[1] / now) ** 2 + (self.healthy[1] / healthy) ** 2
         return math.sqrt(max(whole - alike, 0.0))
@@ -146,16 +146,15 @@ def carried(
     to: SlidingFriction,
     numbers: Mapping[str, Measured] = _NOTHING,
 ) -> SlidingFriction | None:
-    """Carry the sliding friction of a result to the speed of another one.
+    """Carry the sliding friction of a result to the speed of another.
 
-    The exponent of the friction curve at the speed of the record, which is among the `numbers` of
-    the valve, says how friction changes near it. Farther away F_v, as far as it is known, says by
-    how much friction grows with the speed; by how much it also falls, nobody knows (`_USUAL_FALL`).
-    The one that knows more is joined with what is usual (`_USUAL_EXPONENT`). The farther the
-    speeds are apart, the wider the interval.
+    Near the speed of the record, the exponent of the friction curve in `numbers` gives the change
+    of friction. Farther away, F_v gives the growth with speed as far as it is known, and a prior
+    gives the fall (`_USUAL_FALL`). The more precise of the two is combined with the prior of the
+    exponent (`_USUAL_EXPONENT`). The interval widens with the distance of the speeds.
 
-    Returns None where there is no sliding friction above zero, or the speeds are so far apart that
-    too little is known between them (`_WIDEST_STEP`).
+    Returns None where no sliding friction is above zero, or the speeds are too far apart
+    (`_WIDEST_STEP`).
     """
     sliding = parameters.get(SLIDING)
     if sliding is None or not (sliding.value > 0 and sliding.half_width >= 0 and speed > 0):
@@ -173,7 +172,7 @@ def carried(
 
 
 def _viscous_shares(viscous: Parameter | None, largest: float) -> tuple[float, float]:
-    """Return the least and the largest share of friction that is viscous, of `largest` = F/v."""
+    """Return the least and the largest viscous share of friction; `largest` is F/v."""
     if viscous is None:
         return 0.0, 1.0
     one = viscous.without_calibration
@@ -187,7 +186,7 @@ def _viscous_shares(viscous: Parameter | None, largest: float) -> tuple[float, f
 def _step(
     apart: float, viscous_shares: tuple[float, float], exponent: Measured | None
 ) -> tuple[float, float]:
-    """Return by how much the logarithm of friction changes over that of the speed, and ± 95 %."""
+    """Return the change of the logarithm of friction over a change of ln v, and its ± 95 %."""
     low, high = sorted(math.log1p(share * math.expm1(apart)) for share in viscous_shares)
     stretch = -math.expm1(-abs(apart))
     found = 0.5 * (low + high) - math.copysign(_USUAL_FALL * stretch, apart)
@@ -210,18 +209,18 @@ def compared(
     baseline: Baseline,
     numbers: Mapping[str, Measured] = _NOTHING,
 ) -> Comparison | None:
-    """Compare the friction of a result with its baseline, by the number that says more.
+    """Compare the friction of a result with its baseline, by the more conclusive friction.
 
     The sliding friction is carried to the speed of the baseline (`carried`). F_c is compared where
-    there is no such pair. Where both can be, F_c counts only if it is identified, and has not
-    changed by more newtons than the sliding friction can have: what F_c gains from F_v, or loses to
-    it, is no change of friction. Then the one counts that has surely changed further, or, where
-    neither has surely changed, the one known better: a lag between the signals changes the sliding
-    friction and not F_c, and the viscous part hides the growth of F_c.
+    that is not possible. Where both are comparable, F_c qualifies only if it is identified and has
+    not surely changed by more newtons than the sliding friction: an exchange between F_c and F_v
+    is no change of friction. The friction that has surely changed further then decides. If neither
+    has surely changed, the better known decides. A lag between the signals changes the sliding
+    friction but not F_c, and the viscous part hides growth of F_c.
 
-    The uncertainties of area and sensor scales are left out of both sides: the same area and
-    sensors scale both frictions alike, and a common scale cancels in the ratio. After a new
-    calibration the baseline must be set anew.
+    Both sides leave out the uncertainties of area and sensor scales: the same area and sensors
+    scale both frictions, and a common scale cancels in the ratio. After a new calibration, set the
+    baseline again.
 
     Parameters
     ----------
@@ -232,12 +231,12 @@ def compared(
     baseline : Baseline
         Friction of the healthy valve.
     numbers : mapping of str to Measured, optional
-        What else the result says of its valve (`valve_numbers`).
+        Further numbers of the valve from the result (`valve_numbers`).
 
     Returns
     -------
     Comparison or None
-        None where the result has no friction that the baseline has.
+        None where result and baseline have no comparable friction.
     """
     by_sliding = by_coulomb = None
     if baseline.sliding is not None:
@@ -267,14 +266,14 @@ def compared(
 def _shared(
     now: Mapping[str, Measured], healthy: Mapping[str, Measured], speeds: float
 ) -> tuple[float, float]:
-    """Return what both half widths share, N: a lag is a force that grows with the speed."""
+    """Return the common parts of both half widths, N: the force of a lag grows with speed."""
     if not (SHARED in now and SHARED in healthy):
         return 0.0, 0.0
     return now[SHARED].value / speeds, healthy[SHARED].value
 
 
 def _exchanged(coulomb: Comparison, sliding: Comparison) -> bool:
-    """Return whether F_c has surely changed by more newtons than the sliding friction, one way."""
+    """Return whether F_c surely moved by more newtons than the sliding friction."""
     change, width = coulomb.excess
     limit, doubt = sliding.excess
     way = math.copysign(1.0, change)

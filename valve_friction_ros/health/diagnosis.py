@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""From a result to the diagnosis: whether friction has grown or collapsed, and its consequence."""
+"""Diagnosis of friction: whether it has grown or collapsed, and the consequence for the valve."""
 
 import math
 from collections.abc import Iterable, Mapping
@@ -32,28 +32,28 @@ from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.wording import Code, Statement, said, sentence
 
 _SURELY = 1.5
-"""Half widths of its 95 % interval by which a ratio must differ from 1 to be a change at all.
+"""Half widths of its 95 % interval by which a ratio must differ from 1 to show a change.
 
-With normal errors three of a thousand records of an unchanged valve differ by so much; by one half
-width, 5 %: in a plant of a hundred valves some would always be in doubt."""
+With normal errors, 3 of 1000 records of an unchanged valve exceed this. At one half width 5 %
+would, and in a plant of a hundred valves some would always be in doubt."""
 
 
 @dataclass(frozen=True)
 class FrictionLimits:
     """Bounds of the friction, as ratios to its baseline.
 
-    `friction_state` says when one counts as passed.
+    `friction_state` defines when a bound is exceeded.
 
     Attributes
     ----------
     warn_ratio : float
-        Ratio from which the valve is worth maintenance.
+        Ratio from which the valve requires maintenance.
     error_ratio : float
         Ratio from which friction is excessive.
     low_ratio : float
         Ratio below which friction has collapsed: the packing is worn and may leak.
     survey : SurveyLimits
-        Bounds of the dead band, where there is no baseline; not compared, as no ratio is of them.
+        Bounds of the dead band for a valve without a baseline; ignored by equality.
 
     Raises
     ------
@@ -63,8 +63,8 @@ class FrictionLimits:
     Notes
     -----
     No standard gives such ratios; the defaults are chosen. 2 doubles the dead band (F_c + F_s)/k,
-    0.5 halves it, and 1.25 is five times the half width that an identified friction may have
-    (`WEAK_SHARE`). A plant may know better: the ratios are parameters.
+    0.5 halves it, and the growth of 0.25 is five times the largest half width of an identified
+    friction (`WEAK_SHARE`). The ratios are parameters, so a plant can set better values.
     """
 
     warn_ratio: float = 1.25
@@ -83,53 +83,53 @@ class FrictionLimits:
 
     @property
     def ratios(self) -> dict[str, float]:
-        """The ratios by name, as they are kept."""
+        """The ratios by name, as stored."""
         return {name: getattr(self, name) for name in ("warn_ratio", "error_ratio", "low_ratio")}
 
     @property
     def low_warn_ratio(self) -> float:
-        """Ratio below which a valve is worth maintenance, between `low_ratio` and 1.
+        """Ratio below which the valve requires maintenance, between `low_ratio` and 1.
 
-        The inverse of `warn_ratio`, but halfway to `low_ratio` by logarithm where that is nearer
+        It is the inverse of `warn_ratio`, or halfway to `low_ratio` by logarithm if that is nearer
         to 1.
         """
         return max(1 / self.warn_ratio, math.sqrt(self.low_ratio))
 
 
 class FrictionState(Enum):
-    """How the friction of a record compares with its baseline."""
+    """State of the friction of a record against its baseline."""
 
     UNKNOWN = auto()
-    """It is not compared."""
+    """Not compared."""
     IMPOSSIBLE = auto()
-    """It is below zero."""
+    """Below zero."""
     NORMAL = auto()
     UNCLEAR = auto()
-    """It is beyond a limit, and may be unchanged all the same."""
+    """Beyond a limit, but possibly unchanged."""
     GROWN = auto()
-    """It has surely changed, and most probably beyond the bound of a warning."""
+    """Surely changed, and most probably beyond the warning bound."""
     EXCESS = auto()
     FALLEN = auto()
     COLLAPSED = auto()
 
     @property
     def side(self) -> "Side | None":
-        """The side on which the friction surely is; None where it is not sure."""
+        """The side to which the friction has surely moved; None if that is not sure."""
         return _SIDES.get(self)
 
     @property
     def is_uncertain(self) -> bool:
-        """Whether the friction is beyond a limit, and may be unchanged all the same."""
+        """Whether the friction is beyond a limit, but possibly unchanged."""
         return self is FrictionState.UNCLEAR
 
     @property
     def level(self) -> Level:
-        """Severity of what the record says of the friction."""
+        """Severity of the state."""
         return _SEVERITY[self][0]
 
 
 class Side(Enum):
-    """Where the friction is, seen from its baseline."""
+    """Side of the baseline on which the friction lies."""
 
     HIGH = "high"
     LOW = "low"
@@ -156,7 +156,7 @@ _SEVERITY = {
 
 @dataclass(frozen=True)
 class StandingAlarm:
-    """An alarm on the friction that later records have not ended.
+    """A friction alarm that later records have not cleared.
 
     Attributes
     ----------
@@ -165,11 +165,11 @@ class StandingAlarm:
     status_signal : StatusSignal
         The severity as a status signal of NE 107.
     state : FrictionState
-        What the record said that raised it, or what later ones leave of it.
+        State of the record that raised it, or what later records leave of it.
     statement : Statement
-        What the record said, dated.
+        Dated statement of that record.
     time : int
-        When that record was identified, ns since 1970 (UTC).
+        Time of identification of that record, ns since 1970 (UTC).
     """
 
     level: Level
@@ -181,7 +181,7 @@ class StandingAlarm:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """The diagnosis of a valve: the state of its friction.
+    """Diagnosis of the friction of a valve.
 
     Attributes
     ----------
@@ -190,18 +190,18 @@ class Diagnosis:
     status_signal : StatusSignal
         The severity as a status signal of NE 107.
     statement : Statement
-        What is found, with the consequence.
+        The finding and its consequence.
     ratio : Ratio or None
-        Friction over its baseline, with its interval and the friction that is compared; None
-        without a baseline, or where the result has no friction to compare with it.
+        Friction over its baseline, with its interval and the compared friction; None without a
+        baseline, or where the result has no friction comparable with it.
     state : FrictionState
-        What the record says of the friction.
+        State of the friction.
     doubt : Statement or None
-        Why the model does not describe the valve, with which the statement begins; None if it does.
+        Why the model does not describe the valve, at the start of the statement; None if it does.
     alarm : StandingAlarm or None
-        The alarm of an earlier record that stands.
+        The alarm of an earlier record that is still active.
     latest : Diagnosis or None
-        What the record itself says, where an alarm stands.
+        The diagnosis of the latest record by itself, where such an alarm is active.
     """
 
     level: Level
@@ -217,17 +217,17 @@ class Diagnosis:
     def of(
         cls, state: FrictionState, statement: Statement, ratio: Ratio | None = None
     ) -> "Diagnosis":
-        """Return the diagnosis of a state, as severe as that is."""
+        """Return the diagnosis of a state, with its severity."""
         return cls(*_SEVERITY[state], statement, ratio, state)
 
     @property
     def message(self) -> str:
-        """What is found in one sentence."""
+        """The finding in one sentence."""
         return sentence(self.statement)
 
     @property
     def survey(self) -> Survey:
-        """What a first survey says of a valve without a baseline."""
+        """Grade of a valve without a baseline in a first survey."""
         told = self.statement
         while isinstance(inner := told.facts.get("of"), Statement):
             told = inner
@@ -235,13 +235,14 @@ class Diagnosis:
 
     @property
     def own(self) -> "Diagnosis":
-        """What the record itself says."""
+        """The diagnosis of the latest record by itself."""
         return self.latest or self
 
     def possible(self, side: Side, limits: FrictionLimits) -> Level:
-        """Return the level that the friction may have on a side, by the interval of its ratio.
+        """Return the highest level on a side that the interval of the ratio allows.
 
-        A record whose friction is not compared leaves any level possible.
+        Without a ratio every level stays possible, unless friction has surely moved to the other
+        side.
         """
         if self.ratio is None:
             return Level.OK if self.state.side not in (None, side) else Level.ERROR
@@ -252,9 +253,9 @@ class Diagnosis:
         return Level(2 - sum(is_below))
 
     def of_before(self, time: int | None) -> "Diagnosis":
-        """Return what is said of a valve that is not watched now, by its record of a time, ns.
+        """Return the diagnosis of a valve that is not watched now, from its record at `time`, ns.
 
-        What was normal then need not be so now.
+        It reports normal friction in the past tense: it may have changed since.
         """
         if self.state is not FrictionState.NORMAL or self.ratio is None:
             return self
@@ -263,9 +264,9 @@ class Diagnosis:
         return replace(self, statement=_doubted(was, self.doubt))
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the diagnosis as a mapping of plain values, from which other forms are derived.
+        """Return the diagnosis as a mapping of plain values, the source of all other formats.
 
-        Its keys are ``level`` (OK, WARN or ERROR), ``ne_107``, ``message``, ``ratio``,
+        The keys are ``level`` (OK, WARN or ERROR), ``ne_107``, ``message``, ``ratio``,
         ``ratio_interval``, ``ratio_of``, ``ratio_speed`` and ``survey``.
         """
         ratio = self.ratio
@@ -281,13 +282,13 @@ class Diagnosis:
         }
 
     def __str__(self) -> str:
-        """Return level and message on one line; the level is unknown where nothing was compared."""
+        """Return level and message on one line; OK reads unknown where nothing was compared."""
         is_unknown = self.level is Level.OK and self.ratio is None
         return f"{'unknown' if is_unknown else self.level.name}: {self.message}"
 
 
 class Frictions(Protocol):
-    """The numbers that a diagnosis compares: those of a `Result`, or kept ones."""
+    """The numbers that a diagnosis compares, from a `Result` or stored."""
 
     @property
     def parameters(self) -> Mapping[str, Parameter]:
@@ -299,41 +300,41 @@ class Frictions(Protocol):
 
     @property
     def sliding_speed(self) -> float:
-        """Speed that the sliding friction belongs to, m/s."""
+        """Speed of the sliding friction, m/s."""
 
 
 class EarlierEstimate(Frictions, Protocol):
-    """An estimate that was kept, with the diagnosis that was made by it."""
+    """A stored estimate with its diagnosis."""
 
     @property
     def time(self) -> int:
-        """When it was identified, ns since 1970 (UTC)."""
+        """Time of identification, ns since 1970 (UTC)."""
 
     @property
     def diagnosis(self) -> Diagnosis:
-        """The diagnosis of that time."""
+        """The diagnosis at that time."""
 
     @property
     def baseline(self) -> Baseline | None:
-        """The baseline of that time."""
+        """The baseline at that time."""
 
     @property
     def limits(self) -> FrictionLimits:
-        """The limits of that time."""
+        """The limits at that time."""
 
     @property
     def numbers(self) -> Mapping[str, Measured]:
-        """What else was measured of the valve."""
+        """Further measured numbers of the valve."""
 
     def to_dict(self) -> dict[str, Any]:
-        """Return it as plain values, with the keys of `Result.to_dict`."""
+        """Return plain values with the keys of `Result.to_dict`."""
 
 
 def dead_band(result: Frictions, valve: Valve) -> float:
     """Return the dead band of the stem as a share of the travel.
 
-    After a move the sliding friction F_c still holds the spring off balance; to move back, the
-    actuator must reverse it and overcome F_s: the same change of pressure would move a
+    After a move the sliding friction F_c still holds the spring off balance. To move back, the
+    actuator must reverse this force and overcome F_s. The same change of pressure would move a
     frictionless stem by (F_c + F_s)/k. Without a slip jump F_s is F_c. The result is nan without a
     spring, without travel stops, or where F_c or k is not identifiable.
     """
@@ -351,8 +352,8 @@ def dead_band(result: Frictions, valve: Valve) -> float:
 def dead_band_half_width(result: Frictions, valve: Valve) -> float:
     """Return half the width of the 95 % interval of the dead band, as a share of the travel.
 
-    The errors of F_c and F_s are taken as one, which is the widest; that of k is independent. The
-    result is nan where the dead band is.
+    The errors of F_c and F_s are taken as fully correlated, the worst case. The error of k is
+    independent. The result is nan where the dead band is.
     """
     band = dead_band(result, valve)
     if math.isnan(band):
@@ -366,10 +367,10 @@ def dead_band_half_width(result: Frictions, valve: Valve) -> float:
 
 
 def survey_of(result: Frictions, valve: Valve, limits: SurveyLimits | None = None) -> Survey:
-    """Return what a first survey says of a valve, by its dead band.
+    """Return the grade of a valve in a first survey, by its dead band.
 
-    Where there is no spring, twice the sliding friction over the force of the pressure sensor's
-    range takes its place.
+    Without a spring constant, twice the friction over the force of the pressure sensor's range
+    takes the place of the dead band.
     """
     band, width = dead_band(result, valve), dead_band_half_width(result, valve)
     if math.isnan(band) and valve.diaphragm_area is not None:
@@ -381,9 +382,9 @@ def survey_of(result: Frictions, valve: Valve, limits: SurveyLimits | None = Non
 
 
 def leading_ratio(diagnosis: Diagnosis, findings: Iterable[Finding], level: Level) -> float:
-    """Return the friction over its baseline that a level of a valve rests on; nan if on none.
+    """Return the friction ratio behind a level of a valve; nan if there is none.
 
-    A finding on the friction that leads comes before the latest identification, any other after it.
+    A leading finding on friction comes before the latest identification, any other after it.
     """
     known = [f for f in findings if f.level == level and not math.isnan(f.friction_ratio)]
     leading = [f.friction_ratio for f in known if f.leads]
@@ -431,11 +432,10 @@ def diagnose(
     Returns
     -------
     Diagnosis
-        Its state is that of `friction_state`: an uncertain result raises no alarm, as friction must
-        surely have changed.
+        Its state follows `friction_state`: an uncertain result raises no alarm.
         A friction that is not identifiable has collapsed where even its largest possible value
-        lies below the low bound. A model that does not describe the valve is said, and raises no
-        alarm: one record is no sign of a fault.
+        lies below the low bound. A model that does not describe the valve is reported without an
+        alarm: a single record is no sign of a fault.
     """
     limits = limits or FrictionLimits()
     for friction in _frictions(result):
@@ -456,11 +456,11 @@ def diagnose_again(
     baseline: Baseline | None,
     limits: FrictionLimits,
 ) -> Diagnosis:
-    """Return the diagnosis of an estimate that was kept.
+    """Return the diagnosis of a stored estimate.
 
-    It is `kept`, that of its time, unless another baseline, or other limits, are in force and the
-    frictions can be compared with them. Without a baseline it stays: an alarm does not end because
-    the baseline of that time was not kept. A doubt about the model stays.
+    It is `kept`, the stored diagnosis, unless the baseline or the limits have changed and the
+    frictions are comparable with the new ones. Without a baseline it stays: an alarm does not clear
+    because its baseline was not stored. A doubt about the model stays.
     """
     is_same = (baseline, limits) == (earlier.baseline, earlier.limits)
     if baseline is None or is_same or any(one.value < 0 for one in _frictions(earlier)):
@@ -517,11 +517,10 @@ def _vanished(
     limits: FrictionLimits,
     numbers: Mapping[str, Measured],
 ) -> Statement | None:
-    """Return that a friction too small to be identified lies below the low limit, or None.
+    """Return a statement if a friction too small to identify lies below the low limit, else None.
 
-    The sliding friction decides where both have it. F_c decides only where no sliding friction
-    contradicts it: what F_c loses to F_v is no collapse. At a higher speed a sliding friction is
-    larger, at most by the ratio of the speeds.
+    F_c decides only where no sliding friction contradicts it: what F_c loses to F_v is no collapse.
+    At a higher speed a sliding friction is larger, at most by the ratio of the speeds.
     """
     healthy = {"coulomb_friction": (baseline.coulomb_friction or 0.0, baseline.half_width)}
     if (slid := baseline.sliding) is not None:
@@ -553,9 +552,9 @@ def against(
     effect: Statement,
     healthy: Statement | None = None,
 ) -> Diagnosis:
-    """Return the diagnosis of a friction over the `healthy` one, its baseline if not given.
+    """Return the diagnosis of a ratio to the `healthy` friction, by default the baseline.
 
-    `effect` is what the friction does to the valve.
+    `effect` states the consequence of the friction for the valve.
     """
     state = friction_state(ratio, limits)
     statement = said(
@@ -570,11 +569,12 @@ def against(
 
 
 def friction_state(ratio: Ratio, limits: FrictionLimits) -> FrictionState:
-    """Return what a ratio and its 95 % interval say.
+    """Return the state of friction from a ratio and its 95 % interval.
 
     Friction is excessive, or has collapsed, where the whole interval lies beyond the bound. It has
-    grown or fallen where the ratio lies beyond the bound of a warning and friction has surely
-    changed (`_SURELY`); where the change may be chance, nothing is said for sure.
+    grown or fallen where the whole interval lies beyond the warning bound, or where the ratio does
+    and friction has surely changed (`_SURELY`). Where the change may be chance, the state is
+    unclear.
     """
     surely = math.isnan(ratio.low) or (
         ratio.low > 0

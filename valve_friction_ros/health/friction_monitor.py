@@ -50,11 +50,11 @@ from valve_friction_ros.streams.record_buffer import RecordBuffer, Snapshot
 from valve_friction_ros.wording import Code, Statement, said
 
 _LESSER = {Side.HIGH: FrictionState.GROWN, Side.LOW: FrictionState.FALLEN}
-"""What is left of an alarm that a record has surely ended as an ERROR, and not as a WARN."""
+"""State of an alarm after a record has surely cleared its ERROR but not its WARN."""
 
 
 def raised(diagnosis: Diagnosis, time: int) -> StandingAlarm | None:
-    """Return the alarm on the friction that a record, identified at a time, ns, raises, if any."""
+    """Return the friction alarm raised by a record that was identified at `time`, ns, if any."""
     if diagnosis.state.side is None:
         return None
     dated = said(Code.DATED, of=diagnosis.statement, time=time)
@@ -64,22 +64,22 @@ def raised(diagnosis: Diagnosis, time: int) -> StandingAlarm | None:
 def followed(
     alarm: StandingAlarm, latest: Diagnosis, limits: FrictionLimits
 ) -> StandingAlarm | None:
-    """Return what the next record leaves of an alarm.
+    """Return what remains of an alarm after the next record.
 
     Parameters
     ----------
     alarm : StandingAlarm
         An alarm of an earlier record.
     latest : Diagnosis
-        What the next record says by itself.
+        Diagnosis of the next record by itself.
     limits : FrictionLimits
         Bounds of the friction.
 
     Returns
     -------
     StandingAlarm or None
-        The same, where that record leaves its level possible; a lesser one where it surely ends the
-        ERROR and not the WARN; None where it surely ends both, or is an alarm as severe by itself.
+        The same alarm if that record leaves its level possible; a WARN if it surely clears the
+        ERROR but not the WARN; None if it surely clears both, or raises as severe an alarm itself.
     """
     side = alarm.state.side
     if side is None:
@@ -91,7 +91,7 @@ def followed(
 
 
 def limited(alarm: StandingAlarm, level: Level) -> StandingAlarm:
-    """Return an alarm of a level, WARN or more, at most."""
+    """Return an alarm lowered to a level, WARN or ERROR, if it exceeds it."""
     if alarm.level <= level or alarm.state.side is None:
         return alarm
     signal, state = StatusSignal.MAINTENANCE_REQUIRED, _LESSER[alarm.state.side]
@@ -99,9 +99,9 @@ def limited(alarm: StandingAlarm, level: Level) -> StandingAlarm:
 
 
 def standing(alarm: StandingAlarm | None, latest: Diagnosis) -> Diagnosis:
-    """Return what is said of a valve whose latest record has not ended an alarm.
+    """Return the diagnosis of a valve whose latest record has not cleared an alarm.
 
-    It is the alarm with its date, and what the latest record says, whose ratio it has.
+    It states the dated alarm and the latest record, and has the ratio of the latest record.
     """
     if alarm is None:
         return latest
@@ -122,11 +122,11 @@ def standing(alarm: StandingAlarm | None, latest: Diagnosis) -> Diagnosis:
 
 
 MOST_SAMPLES = 65_536
-"""Samples of a signal that are identified at most; of more, means are. Chosen: the usual window of
-60 s at 1 kHz stays as it is, and an identification by the default method takes about a second."""
+"""Most samples per signal in an identification; longer records are averaged. Chosen: the usual
+window of 60 s at 1 kHz is not averaged, and the default method takes about a second."""
 
 _REFUSED = 3
-"""Refusals in a row from which they are a fault. Chosen: one bad record, or two, may be chance."""
+"""Refusals in a row that make a fault. Chosen: one or two bad records may be chance."""
 
 
 @dataclass(frozen=True)
@@ -140,13 +140,13 @@ class MonitorSettings:
     identification : IdentificationSettings
         Settings of the identification.
     method : str
-        Name of the method of identification, among `METHODS`; a former name becomes the new one.
+        Name of the method of identification, among `METHODS`; a former name is replaced.
     limits : FrictionLimits
         Bounds of the friction.
     window : float
         Length of the buffered and identified record, s.
     valve_limits : ValveLimits
-        Bounds of what else may change on the valve.
+        Bounds of the other changes of the valve.
     """
 
     valve: Valve
@@ -173,16 +173,16 @@ class IdentificationInput(NamedTuple):
 def identify_with_numbers(
     snapshot: Snapshot, settings: MonitorSettings
 ) -> tuple[Result, dict[str, Measured]]:
-    """Return what `identify_snapshot` returns, and the numbers of the valve by that result."""
+    """Return the result of `identify_snapshot` and its numbers of the valve."""
     result = identify_snapshot(snapshot, settings)
     return result, valve_numbers(result)
 
 
 def identify_snapshot(snapshot: Snapshot, settings: MonitorSettings) -> Result:
-    """Identify a snapshot of the buffer. It does not use the monitor, so any thread may run it.
+    """Identify a snapshot of the buffer; any thread may do so, as no monitor is involved.
 
-    Of more than `MOST_SAMPLES` samples of a signal means are identified (`Snapshot.thinned`), as
-    the evidence of the result then says: so the work is bounded, whatever rate and window.
+    More than `MOST_SAMPLES` samples of a signal are averaged (`Snapshot.thinned`), which bounds the
+    work at any rate and window. The evidence of the result then states the averaging.
 
     Raises RefusedRecordError with the cause, and with the cause of a recent clearing of the buffer.
     """
@@ -207,7 +207,7 @@ def identify_snapshot(snapshot: Snapshot, settings: MonitorSettings) -> Result:
 
 
 def _of_means(result: Result, count: int) -> Result:
-    """Return a result whose evidence says of how many samples its record has means."""
+    """Return a result whose evidence states how many samples each mean of its record covers."""
     told = f"the record consists of averages of {count} successive samples"
     return replace(
         result,
@@ -217,10 +217,10 @@ def _of_means(result: Result, count: int) -> Result:
 
 
 class _Raised(NamedTuple):
-    """What has raised the alarm that stands.
+    """Origin of the active alarm.
 
-    An estimate of a time, ns, or the alarm that an earlier run has kept; later records have left of
-    it a level at most.
+    It is an estimate with its time, ns, or an alarm stored by an earlier run. `most` is the highest
+    level that later records leave.
     """
 
     time: int
@@ -240,7 +240,7 @@ class FrictionMonitor:
     Attributes
     ----------
     buffer : RecordBuffer
-        The last seconds of both signals.
+        Buffer of both signals over the window.
     """
 
     def __init__(self, settings: MonitorSettings) -> None:
@@ -258,7 +258,7 @@ class FrictionMonitor:
 
     @property
     def baseline(self) -> Baseline | None:
-        """The healthy valve; setting it drops what is known from before the latest result."""
+        """The healthy valve; setting it drops numbers older than the latest result."""
         return self._baseline
 
     @baseline.setter
@@ -274,19 +274,19 @@ class FrictionMonitor:
 
     @property
     def result(self) -> Result | None:
-        """The latest result; a refusal leaves the one before it in place."""
+        """The latest result; a refusal leaves it in place."""
         return self._result
 
     @property
     def stamp(self) -> int | None:
-        """When the latest result was found, or the earlier estimate, ns."""
+        """Time of the latest result or of the earlier estimate, ns."""
         return self._stamp
 
     @property
     def seen_until(self) -> int | None:
-        """End of the record of the latest result by its stamps, or time of the earlier estimate.
+        """End of the latest result's record by its stamps, or time of the earlier estimate.
 
-        Both are ns since 1970 (UTC), as the moves in service have them.
+        Both are ns since 1970 (UTC), as for the moves in service.
         """
         if self._result is None:
             return self._stamp
@@ -305,12 +305,12 @@ class FrictionMonitor:
 
     @property
     def known(self) -> KnownNumbers:
-        """What is known of the valve beside its friction, also by earlier records."""
+        """Numbers of the valve beside its friction, including those of earlier records."""
         return self._known
 
     @property
     def changes(self) -> dict[str, Measured]:
-        """Changes of these numbers since the baseline; empty without one."""
+        """Changes of the known numbers since the baseline; empty without a baseline."""
         return (
             {}
             if self.baseline is None
@@ -319,22 +319,22 @@ class FrictionMonitor:
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """What has changed on the valve beside its friction (`KnownNumbers.findings`)."""
+        """Changes of the valve beside its friction (`KnownNumbers.findings`)."""
         settings = self._settings
         return self._known.findings(self.baseline, settings.valve, settings.valve_limits)
 
     @property
     def held(self) -> Finding | None:
-        """That the latest test could not move the stem, if it asked for more than the limits."""
+        """Finding that the latest test exceeded the friction limits without moving the stem."""
         baseline, settings = self.baseline, self._settings
         if baseline is None:
             return None
         return held_finding(self._known.of_latest, baseline, settings.valve, settings.limits)
 
     def may_have_changed(self) -> bool:
-        """Return whether, by the far ends of the intervals, something beside friction may differ.
+        """Return whether the far ends of the intervals show a change beside friction.
 
-        So an alarm on it ends where no more than an interval's width of doubt is left.
+        An alarm on the whole valve clears only once they show none.
         """
         baseline, settings = self.baseline, self._settings
         if baseline is None or not baseline.numbers:
@@ -344,7 +344,7 @@ class FrictionMonitor:
 
     @property
     def common_factor(self) -> Measured | None:
-        """Factor by which spring and friction have changed alike, if they have."""
+        """Common factor of change of spring and friction, if there is one."""
         return self._known.common_factor(self.baseline, self._settings.valve_limits)
 
     @property
@@ -358,9 +358,9 @@ class FrictionMonitor:
         return self._internal_error
 
     def change_settings(self, settings: MonitorSettings) -> None:
-        """Put new settings in force; a new window or valve empties the buffer.
+        """Apply new settings; a new window or valve clears the buffer.
 
-        With a new valve only what the latest record says stays.
+        A new valve keeps only the numbers of the latest record.
         """
         if settings.valve != self._settings.valve:
             self._known = self._known.only_latest()
@@ -372,13 +372,13 @@ class FrictionMonitor:
         self._settings = settings
 
     def input(self) -> IdentificationInput:
-        """Return a copy of the buffer, with the settings in force."""
+        """Return a copy of the buffer with the present settings."""
         return IdentificationInput(self.buffer.snapshot(), self._settings)
 
     def remember(self, earlier: EarlierEstimate, known: KnownNumbers | None = None) -> None:
-        """Go on with an estimate from before the monitor began, until there is a result.
+        """Continue with an estimate from before the monitor began, until there is a result.
 
-        What was `known` of the valve beside its friction by earlier records goes on, too.
+        The numbers `known` from earlier records continue, too.
         """
         self._earlier, self._stamp = earlier, earlier.time
         self._known = (known or KnownNumbers()).with_record(earlier.numbers, earlier.time)
@@ -388,9 +388,9 @@ class FrictionMonitor:
         self._follow_alarm()
 
     def renew(self, time: int) -> None:
-        """Begin anew with a packing of the time `time`, ns: alarms of older records end.
+        """Start with a packing renewed at `time`, ns: alarms of older records clear.
 
-        What the latest record itself says stays until the next one.
+        The diagnosis of the latest record by itself stays until the next record.
         """
         if self._raised is not None and self._raised.time <= time:
             self._raised = None
@@ -398,7 +398,7 @@ class FrictionMonitor:
     def accept(
         self, result: Result, stamp: int, numbers: Mapping[str, Measured] | None = None
     ) -> None:
-        """Remember a result found at `stamp` (ns), with its `valve_numbers`, if they are known."""
+        """Store a result found at `stamp`, ns, with its `valve_numbers` if already computed."""
         self._result, self._earlier, self._stamp = result, None, stamp
         found = valve_numbers(result) if numbers is None else numbers
         self._known = self._known.followed_by(found, stamp)
@@ -407,7 +407,7 @@ class FrictionMonitor:
         self._follow_alarm()
 
     def _follow_alarm(self) -> None:
-        """Let the latest estimate raise an alarm, leave one or end it."""
+        """Let the latest estimate raise, keep or clear an alarm."""
         latest = self.estimate
         if latest is None or self._stamp is None:
             return
@@ -419,7 +419,7 @@ class FrictionMonitor:
             self._raised = None if own.state.side is None else _Raised(self._stamp, latest)
 
     def _alarm(self) -> StandingAlarm | None:
-        """Return the alarm that stands, by the baseline and the limits in force."""
+        """Return the active alarm, by the present baseline and limits."""
         if self._raised is None:
             return None
         time, estimate, alarm, most = self._raised
@@ -428,32 +428,32 @@ class FrictionMonitor:
         return None if alarm is None else limited(alarm, most)
 
     def learn(self, numbers: Mapping[str, Measured], stamp: int) -> None:
-        """Remember what a refused record shows of the valve, if anything, found at `stamp` (ns)."""
+        """Store the numbers of the valve from a refused record, found at `stamp`, ns."""
         if numbers:
             self._known = self._known.followed_by(numbers, stamp)
 
     def refuse(self, refusal: RefusalError) -> None:
-        """Remember that an identification was refused."""
+        """Store the refusal of an identification."""
         self._refusal = str(refusal)
         self.skip(refusal)
 
     def skip(self, refusal: RefusalError) -> None:
-        """Count a refusal, which leaves the diagnosis as it is.
+        """Count a refusal without changing the diagnosis.
 
-        A record with too little motion is no fault, and does not end one either.
+        A record with too little motion is no fault, nor does it clear one.
         """
         if isinstance(refusal, RefusedRecordError) and refusal.is_fault:
             self._refused, self._refused_last = self._refused + 1, str(refusal)
 
     @property
     def refusals_problem(self) -> Statement | None:
-        """That one identification after the other is refused, with the latest reason, if so."""
+        """Statement of repeated refusals with the latest reason; None if there are too few."""
         if self._refused < _REFUSED:
             return None
         return said(Code.REFUSED_REPEATEDLY, count=self._refused, reason=self._refused_last)
 
     def fail(self, internal_error: str) -> None:
-        """Remember that a bug has ended an identification, whatever its record."""
+        """Store the bug that ended an identification."""
         self._internal_error = internal_error
 
     def result_as_baseline(self) -> Baseline:
@@ -466,17 +466,17 @@ class FrictionMonitor:
         return Baseline.of(self._result)
 
     def baseline_lacks(self) -> tuple[BaselineLack, ...]:
-        """Return the conditions of a baseline that the latest result does not meet; empty: none."""
+        """Return the conditions of a baseline that the latest result fails."""
         if self._result is None:
             return (BaselineLack("result", Lack.RESULT),)
         return Baseline.lacks(self._result)
 
     def diagnosis(self, now: int | None = None, is_watched: bool = True) -> Diagnosis:
-        """Return the diagnosis by the latest result, also after a refusal; OK without any.
+        """Return the diagnosis by the latest result, also after a refusal; OK without a result.
 
-        That of an earlier estimate says how old it is at the time `now`, ns, where that is given.
-        Of a valve that is not watched now, as its samples cannot be used, it says what was.
-        A bug in an identification raises the level to ERROR, until one succeeds.
+        The diagnosis of an earlier estimate states its age at `now`, ns, if given. For a valve that
+        is not watched, because its samples cannot be used, a normal state is in the past tense.
+        A bug in an identification raises the level to ERROR until an identification succeeds.
         """
         diagnosis = self._diagnosis_by_result(now, is_watched)
         if self._internal_error is None:
@@ -504,7 +504,7 @@ class FrictionMonitor:
         return replace(diagnosis, statement=refused)
 
     def _with_alarm(self, estimate: Result | EarlierEstimate) -> Diagnosis:
-        """Return the diagnosis by the latest estimate, and the alarm that it does not end."""
+        """Return the diagnosis by the latest estimate, with the alarm that it does not clear."""
         latest = self._diagnosis_of(estimate)
         if self._raised is not None and self._raised.estimate is estimate:
             return latest

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The newest measurement of each number of a valve, and what has changed by them."""
+"""The newest measurement of each number of a valve, and the changes that they show."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -24,9 +24,9 @@ _ENDS = (("lowest_position", "lower_stop", -1.0), ("highest_position", "upper_st
 
 @dataclass(frozen=True)
 class KnownNumbers:
-    """The newest known measurement of each number of a valve.
+    """The newest measurement of each number of a valve.
 
-    A record that does not show a number leaves the one before it: nothing was repaired by that.
+    A record that does not show a number leaves its earlier value: nothing was repaired.
 
     Attributes
     ----------
@@ -50,21 +50,21 @@ class KnownNumbers:
         return {n: one.number for n, one in self.dated.items() if one.time == self.latest}
 
     def only_latest(self) -> "KnownNumbers":
-        """Return what is known by the latest record alone."""
+        """Return the numbers of the latest record alone."""
         return KnownNumbers(
             {name: one for name, one in self.dated.items() if one.time == self.latest}, self.latest
         )
 
     def since(self, time: int | None) -> "KnownNumbers":
-        """Return what was measured at a time (ns) or later; all for None."""
+        """Return the numbers measured at a time, ns, or later; all for None."""
         kept = {name: one for name, one in self.dated.items() if time is None or one.time >= time}
         return KnownNumbers(kept, self.latest)
 
     def followed_by(self, numbers: Mapping[str, Measured], time: int) -> "KnownNumbers":
-        """Return what is known after a further record.
+        """Return the numbers after a further record.
 
-        A stop that the stem has since gone beyond is no more. How far the stem went stays until
-        the record of a stop, or a record in which it went farther.
+        A stop is dropped once the stem has surely gone beyond it. The farthest position stays until
+        a record shows a stop, or a position at least as far.
         """
         dated = dict(self.dated)
         fresh = dict(numbers)
@@ -81,13 +81,13 @@ class KnownNumbers:
     def common_factor(
         self, baseline: Baseline | None, limits: ValveLimits | None = None
     ) -> Measured | None:
-        """Return the factor by which spring and friction have changed alike (`common_factor`)."""
+        """Return the common factor of change of spring and friction (`common_factor`)."""
         if baseline is None:
             return None
         return common_factor(valve_changes(self.numbers, baseline.numbers), limits or ValveLimits())
 
     def with_record(self, numbers: Mapping[str, Measured], time: int) -> "KnownNumbers":
-        """Return what is known with a record that may be older than others."""
+        """Return the numbers after inserting a record that may be older than others."""
         known = KnownNumbers({n: one for n, one in self.dated.items() if one.time < time})
         known = known.followed_by(numbers, time)
         for later in sorted({one.time for one in self.dated.values() if one.time > time}):
@@ -99,9 +99,9 @@ class KnownNumbers:
     def findings(
         self, baseline: Baseline | None, valve: Valve, limits: ValveLimits | None = None
     ) -> tuple[Finding, ...]:
-        """Return what has changed since a baseline (`diagnose_numbers`).
+        """Return the changes since a baseline (`diagnose_numbers`).
 
-        What rests on a number of an earlier record says when that was.
+        A finding that rests on a number of an earlier record states its date.
         """
         if baseline is None or not baseline.numbers:
             return ()

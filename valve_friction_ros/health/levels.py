@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Severity of what is found on a valve, and its first survey: good, watch or bad."""
+"""Severity of findings on a valve, and the grades of a first survey: good, watch or bad."""
 
 import math
 from collections.abc import Iterable, Mapping
@@ -20,10 +20,10 @@ from valve_friction_ros.wording import Statement, sentence
 
 
 class Survey(Enum):
-    """What a first survey says of a valve."""
+    """Grade of a valve in a first survey."""
 
     UNKNOWN = "unknown"
-    """The record does not tell."""
+    """Cannot be determined from the record."""
     GOOD = "good"
     WATCH = "watch"
     BAD = "bad"
@@ -36,8 +36,8 @@ class SurveyLimits:
     Attributes
     ----------
     watch, bad : float
-        Dead band (F_c + F_s)/k over the travel, which is that of the actuator over its range; where
-        there is no spring, twice the friction over the force of the actuator's range.
+        Dead band (F_c + F_s)/k over the travel. Without a spring: twice the friction over the force
+        of the actuator's range.
 
     Raises
     ------
@@ -46,7 +46,7 @@ class SurveyLimits:
 
     Notes
     -----
-    The defaults are those of ``ptfe`` in `PACKING_LIMITS`.
+    The defaults are the limits of ``ptfe`` in `PACKING_LIMITS`.
     """
 
     watch: float = 0.10
@@ -56,7 +56,7 @@ class SurveyLimits:
     def of_packing(
         cls, packing: str = "ptfe", watch: float | None = None, bad: float | None = None
     ) -> "SurveyLimits":
-        """Return the limits of a class of packing; `watch` and `bad` take their place if given.
+        """Return the limits of a class of packing; `watch` and `bad` override them if given.
 
         Raises ValueError for an unknown class, or limits that are out of order.
         """
@@ -79,15 +79,15 @@ PACKING_LIMITS: Mapping[str, SurveyLimits] = MappingProxyType(
 )
 """Limits by class of packing.
 
-They come from the packings that the paper measured on one valve: that of low friction has 5 %, that
-of high friction, with which its loop oscillates, 21 %, and graphite with a slip jump 27 %. Half of
-what oscillates is to be watched. Graphite may have half as much again, which is chosen."""
+They come from the packings that the paper measured on one valve: 5 % with low friction, 21 % with
+high friction, at which its loop oscillates, and 27 % with graphite and a slip jump. Half of the
+oscillating dead band is the limit of watch. Graphite is allowed half as much again, by choice."""
 
 
 def surveyed(band: float, half_width: float, limits: SurveyLimits | None = None) -> Survey:
-    """Return what a dead band says, a share, with half the width of its 95 % interval.
+    """Return the grade of a dead band, a share, with half the width of its 95 % interval.
 
-    Good and bad are said where the whole interval is; nothing where it spans from good to bad.
+    Good and bad require the whole interval. An interval that spans from good to bad is unknown.
     """
     limits = limits or SurveyLimits()
     low, high = band - half_width, band + half_width
@@ -118,7 +118,7 @@ class StatusSignal(Enum):
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing found on a valve beside its friction.
+    """A finding on a valve besides the diagnosis of its friction.
 
     Attributes
     ----------
@@ -127,13 +127,13 @@ class Finding:
     status_signal : StatusSignal
         The severity as a status signal of NE 107.
     statement : Statement
-        What is found, and what to check.
+        The finding, and what to check.
     numbers : tuple of str
-        Names of the numbers that it rests on, if any.
+        Names of the numbers behind it, if any.
     leads : bool
-        Whether it is about the friction, and newer or surer than the latest identification.
+        Whether it concerns friction, and is newer or more certain than the latest identification.
     friction_ratio : float
-        Friction over its baseline that it rests on; nan if on none.
+        Friction over its baseline behind it; nan if there is none.
     """
 
     level: Level
@@ -149,7 +149,7 @@ class Finding:
         return sentence(self.statement)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return it as a mapping of plain values: ``level``, ``ne_107`` and ``message``."""
+        """Return a mapping of plain values: ``level``, ``ne_107`` and ``message``."""
         return {
             "level": self.level.name,
             "ne_107": self.status_signal.value,
@@ -162,5 +162,5 @@ class Finding:
 
 
 def by_severity(findings: Iterable[Finding]) -> list[Finding]:
-    """Return findings, the most severe first; those of one level keep their order."""
+    """Return findings, the most severe first; equal levels keep their order."""
     return sorted(findings, key=lambda finding: -finding.level)

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""A number with its interval: one type for numbers, changes and ratios, dated or not; changes."""
+"""Numbers with intervals, their dates, and their changes from the baseline."""
 
 import math
 from collections.abc import Mapping
@@ -28,8 +28,8 @@ class Measured:
     half_width : float
         Half the width of its interval.
     low, high : float
-        Ends of the interval, which need not lie evenly around the value: that of a ratio is
-        symmetric in the logarithm (`between`). By default value less and plus half width.
+        Ends of the interval, by default value ± half width. They may be asymmetric: the interval of
+        a ratio is symmetric in the logarithm (`between`).
     """
 
     value: float
@@ -45,7 +45,7 @@ class Measured:
 
     @classmethod
     def between(cls: type[_Kind], value: float, low: float, high: float, **more: Any) -> _Kind:
-        """Return a number by the ends of its interval."""
+        """Return a number from its value and the ends of its interval."""
         return cls(value, 0.5 * (high - low), low, high, **more)
 
     @property
@@ -55,11 +55,11 @@ class Measured:
 
     @property
     def interval(self) -> tuple[float, float, float]:
-        """Value, low and high, as a statement has them."""
+        """Value, low and high, as used in statements."""
         return self.value, self.low, self.high
 
     def agrees_with(self, other: "Measured") -> bool:
-        """Return whether the two intervals have a part in common."""
+        """Return whether the two intervals overlap."""
         return self.low <= other.high and other.low <= self.high
 
     def holds(self, value: float) -> bool:
@@ -71,18 +71,18 @@ class Measured:
         return int(self.low > high) - int(self.high < low)
 
     def times(self, factor: float) -> "Measured":
-        """Return the number in another unit; a negative factor turns the interval round."""
+        """Return the number times a factor; a negative factor swaps the ends of the interval."""
         low, high = sorted((factor * self.low, factor * self.high))
         return Measured.between(factor * self.value, low, high)
 
 
 class DatedNumber(NamedTuple):
-    """A number and when it was identified.
+    """A number with the time of its identification.
 
     Attributes
     ----------
     time : int
-        When, ns since 1970 (UTC).
+        Time, ns since 1970 (UTC).
     value, half_width : float
         Number, and half the width of its 95 % interval, SI unit.
     """
@@ -105,7 +105,7 @@ RATIOS = (
     "drive_noise",
     "stem_noise",
 )
-"""Numbers of which the ratio is compared: they are above zero."""
+"""Numbers compared by their ratio; they are above zero."""
 
 DIFFERENCES = {
     "spring_preload": "N",
@@ -115,15 +115,15 @@ DIFFERENCES = {
     "upper_stop": "m",
     "lag": "s",
 }
-"""Numbers of which the difference is compared, with their units."""
+"""Numbers compared by their difference, with their units."""
 
 
 def _ratio(now: Measured, healthy: Measured) -> Measured | None:
-    """Return a number over that of the baseline.
+    """Return a number over its baseline.
 
-    The half widths of two independent measurements are shares that add in squares, and the interval
-    is symmetric in the logarithm. Where the interval of a number reaches zero, that of the ratio
-    has all quotients of the two intervals.
+    The relative half widths of independent measurements add in squares, and the interval is
+    symmetric in the logarithm. Where the interval of either number reaches zero, the interval of
+    the ratio holds all quotients of the two intervals.
     """
     if not (now.value > 0 and healthy.value > 0):
         return None
@@ -137,7 +137,7 @@ def _ratio(now: Measured, healthy: Measured) -> Measured | None:
 
 
 def difference(now: Measured, healthy: Measured) -> Measured:
-    """Return a number less that of the baseline; independent half widths add in squares."""
+    """Return a number less its baseline; independent half widths add in squares."""
     value, width = now.value - healthy.value, math.hypot(now.half_width, healthy.half_width)
     return Measured(value, width)
 
@@ -145,7 +145,7 @@ def difference(now: Measured, healthy: Measured) -> Measured:
 def valve_changes(
     now: Mapping[str, Measured], healthy: Mapping[str, Measured]
 ) -> dict[str, Measured]:
-    """Return the change of each number that both have, by name: `RATIOS` and `DIFFERENCES`."""
+    """Return the changes of the common numbers by name, as in `RATIOS` and `DIFFERENCES`."""
     both = now.keys() & healthy.keys()
     changes = {name: _ratio(now[name], healthy[name]) for name in RATIOS if name in both}
     found = {name: change for name, change in changes.items() if change is not None}

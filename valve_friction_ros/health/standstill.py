@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""A stem that stands still between its stops while the pressure asks it to move."""
+"""Detection of a stem that rests between its stops although the pressure demands a move."""
 
 import math
 from collections.abc import Mapping
@@ -27,33 +27,33 @@ from valve_friction_ros.streams import Samples
 from valve_friction_ros.wording import Code, said
 
 _STILL = 0.005
-"""Share of the travel within which a stem stands still: above noise and creep. Chosen."""
+"""Band, over the travel, in which a stem is at rest: above noise and creep. Chosen."""
 
 _BLOCK = 10_000_000_000
-"""Time over which samples are averaged, ns: a stem that can move does so within it. Chosen."""
+"""Averaging time, ns: a stem that can move does so within it. Chosen."""
 
 _BLOCK_OF_TEST = 2_000_000_000
-"""The same in a record of a test, ns. Chosen: several times the lag of any sensor and actuator."""
+"""Averaging time in a test, ns. Chosen: several times the lag of any sensor and actuator."""
 
 _STOP = 0.03
 """Share of the travel from an end within which a stem may rest on its stop. Chosen."""
 
 _MOST_BLOCKS = 1000
-"""Means of the pressure that wait for a position; the oldest are dropped."""
+"""Most means of the pressure that wait for a position; the oldest are dropped."""
 
 
 @dataclass(frozen=True)
 class Standstill:
-    """A stem at rest, and the pressures that it has borne meanwhile.
+    """A stem at rest, with the pressures that did not move it.
 
     Attributes
     ----------
     since : int
-        From when it has been seen at rest, ns since 1970 (UTC).
+        Start of the rest, ns since 1970 (UTC).
     position : float
-        Where it rests, m.
+        Position of the rest, m.
     lowest_pressure, highest_pressure : float
-        Range of the pressure, averaged over ten seconds, Pa.
+        Range of the block means of the pressure, Pa.
     """
 
     since: int
@@ -64,8 +64,8 @@ class Standstill:
     def least_friction(self, valve: Valve) -> float:
         """Return the static friction, N, below which the stem would have moved.
 
-        At rest |S_a·(P − P_ref) − k·x − F_0| ≤ F_s, so a change of pressure by ΔP that moves
-        nothing needs 2·F_s ≥ S_a·ΔP, whatever the spring.
+        At rest |S_a·(P − P_ref) − k·x − F_0| ≤ F_s. A change of pressure by ΔP without motion
+        therefore needs 2·F_s ≥ S_a·ΔP, whatever the spring.
         """
         low, high = self.lowest_pressure, self.highest_pressure
         return 0.5 * (valve.actuator_force(high) - valve.actuator_force(low))
@@ -97,7 +97,7 @@ def _mean_of(values: NDArray[np.float64]) -> _Mean:
 
 
 def _means(samples: Samples, length: int) -> dict[int, _Mean]:
-    """Return the sums of each block, in their order: some 20 times a second mostly of one."""
+    """Return the sums of each block in order; a call usually covers a single block."""
     stamps, values = samples
     if not stamps.size:
         return {}
@@ -109,18 +109,18 @@ def _means(samples: Samples, length: int) -> dict[int, _Mean]:
 
 
 class StandstillCounter:
-    """Follows the samples of a valve; keeps the present standstill, and no samples.
+    """Tracks the present standstill of a valve without storing samples.
 
-    A block is still where the stem's mean has stayed and its deviation is small. The pressure of a
-    block counts once the stem is still in a later one: so a stem has had the time to move, and a
-    sensor to say so.
+    The stem is at rest in a block if its mean has not moved and its deviation is small. The
+    pressure of a block is used once the stem is at rest in a later block: this gives the stem time
+    to move, and the sensor time to show it.
 
     Parameters
     ----------
     travel : float
         Distance between the stops, m.
     block : int
-        Time over which samples are averaged, ns.
+        Averaging time, ns.
     """
 
     def __init__(self, travel: float, block: int = _BLOCK) -> None:
@@ -137,13 +137,13 @@ class StandstillCounter:
 
     @property
     def standstill(self) -> Standstill | None:
-        """The present standstill; None where the stem has not been seen at rest with a pressure."""
+        """The present standstill; None without a rest of the stem and a pressure during it."""
         if self._since is None or not self._lowest <= self._highest:
             return None
         return Standstill(self._since, self._place, self._lowest, self._highest)
 
     def add(self, pressures: Samples, positions: Samples) -> None:
-        """Take good samples: finite, within the range of their sensor; older ones begin anew."""
+        """Take samples that are finite and in range; positions of an older block restart."""
         for block, mean in _means(pressures, self._length).items():
             self._pressures[block] = self._pressures.get(block, _Mean()).with_more(mean)
         for block, mean in _means(positions, self._length).items():
@@ -160,7 +160,7 @@ class StandstillCounter:
             del self._pressures[min(self._pressures)]
 
     def _close(self, block: int) -> None:
-        """Judge a block of positions that is complete."""
+        """Judge a complete block of positions."""
         mean = self._positions
         is_still = mean.deviation <= self._band
         if is_still and abs(mean.value - self._place) <= self._band:
@@ -177,11 +177,11 @@ class StandstillCounter:
 
 
 def held_numbers(recording: Recording, valve: Valve) -> dict[str, Measured]:
-    """Return the largest static friction that surely held the stem in a record, N, and where, m.
+    """Return the largest static friction, N, that a standstill in a record demands, and its place.
 
-    There is nothing where the stem nowhere rested. The numbers are ``held_friction``,
-    ``held_force``, the mean of the lowest and the highest force meanwhile, N, and
-    ``held_position``.
+    The numbers are ``held_friction``; ``held_force``, the mean of the lowest and the highest force
+    during the standstill, N; and ``held_position``, m. They are empty without a standstill. They do
+    not exclude that a stop held the stem.
     """
     if not math.isfinite(valve.travel):
         return {}
@@ -210,7 +210,7 @@ def held_finding(
 ) -> Finding | None:
     """Find that a test met more friction than `limits` allow, by its `held_numbers`.
 
-    None without them, and where the stem may have rested on a stop.
+    Return None without them, and where a stop may have held the stem.
     """
     swing, middle, place = (
         numbers.get(name) for name in ("held_friction", "held_force", "held_position")
@@ -236,8 +236,8 @@ def _surely_held(
 ) -> float:
     """Return the largest static friction that surely held the stem in a test, N, or 0.
 
-    It is half of the force's swing. At an end of its way, as in a partial stroke, the stem may have
-    been pressed on a stop: what the force went beyond k·x + F_0 on that side says nothing then.
+    It is half of the swing of the force. At an end of its range, as in a partial stroke, the stem
+    may have been pressed on a stop. The force beyond k·x + F_0 on that side is then ignored.
     """
     can_rise, can_fall = _room(place.value, baseline, valve)
     if can_rise and can_fall:
@@ -257,8 +257,8 @@ def standstill_finding(
 ) -> Finding | None:
     """Find a stem that needs more than `factor` times the friction of its baseline to move.
 
-    None unless it rests where the stem went when the baseline was set, away from the ends of that
-    way: at an end it may rest on a stop under any pressure.
+    Return None unless it rests inside the range of motion of the baseline, away from its ends: at
+    an end it may rest on a stop under any pressure.
     """
     if not all(_room(standstill.position, baseline, valve)):
         return None
@@ -285,9 +285,9 @@ def standstill_finding(
 
 
 def _room(position: float, baseline: Baseline, valve: Valve) -> tuple[bool, bool]:
-    """Return whether a stem can surely move up from a place, and down.
+    """Return whether a stem can surely move up from a position, and down.
 
-    It can where the stem went when the baseline was set: no stop lies between.
+    It can within the range of motion of the baseline: no stop lies there.
     """
     numbers, margin = baseline.numbers, _STOP * valve.travel
     low, high = numbers.get("lowest_position"), numbers.get("highest_position")
@@ -297,9 +297,9 @@ def _room(position: float, baseline: Baseline, valve: Valve) -> tuple[bool, bool
 
 
 def _healthy_friction(baseline: Baseline) -> float:
-    """Return the largest static friction that the baseline admits, N.
+    """Return the largest static friction that the baseline allows, N.
 
-    The sliding friction is no less than F_c, so that F_s is at most that and F_s − F_c.
+    The sliding friction is no less than F_c, so F_s is at most the sliding friction plus F_s − F_c.
     """
     numbers, slip = baseline.numbers, baseline.numbers.get("slip_force")
     if baseline.sliding is not None and slip is not None:

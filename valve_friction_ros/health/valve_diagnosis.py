@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""What has changed on a valve beside its friction, by how much it may, and what to check."""
+"""Changes of a valve beside its friction, their limits, and what to check."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -27,42 +27,42 @@ from valve_friction_ros.wording import Code, Statement, said
 
 @dataclass(frozen=True)
 class ValveLimits:
-    """Bounds of the change of a valve, beside those of its friction (`FrictionLimits`).
+    """Bounds of the changes of a valve beside its friction (`FrictionLimits`).
 
-    A bound counts as passed only when the whole interval of the change lies beyond it.
+    A bound is exceeded only when the whole interval of the change lies beyond it.
 
     Attributes
     ----------
     spring_change, spring_failure : float
-        Change of the spring constant, as a share, that is worth a look, and that is a failure.
+        Changes of the spring constant, as shares, for maintenance and for a failure.
     preload_change : float
         Shift of the balance, as a share of the spring's force over the travel.
     slip_change : float
         Growth of the slip jump (F_s − F_c)/k, as a share of the travel.
     viscous_factor : float
-        Factor, up or down, of the viscous friction.
+        Factor of change of the viscous friction, up or down.
     asymmetry_change : float
         Change of the share by which viscous friction is larger upward.
     stop_change : float
         Shift of a travel stop, as a share of the travel.
     noise_factor : float
-        Factor, upward, of the noise of a sensor.
+        Factor of growth of the noise of a sensor.
     lag_change : float
         Change of the lag of the stem behind the pressure, s.
 
     Raises
     ------
     ValueError
-        If a limit is not above zero, a factor is not above 1, or the spring's two are out of order.
+        If a limit is not positive, a factor is not above 1, or the spring limits are reversed.
 
     Notes
     -----
-    No standard gives such bounds; the defaults are chosen. Springs keep their constant within some
-    percent for decades, so 15 % is a fault of spring or scale, and 30 % is one spring of three.
+    No standard gives such bounds; the defaults are chosen. Springs keep their constant within a few
+    percent for decades, so 15 % is a fault of spring or scale, and 30 % is one spring out of three.
     3 % of the balance is above the drift of industrial sensors and below the usual margin of a
-    bench set. A slip jump of 1 % more of the travel is as large as the steps that a loop commonly
-    makes. A stop that has moved by 2 % no longer shuts, or opens, as it did. Viscous friction
-    trades with the lag and changes with the temperature, so only a factor of 2 counts.
+    bench set. A slip jump larger by 1 % of the travel equals the common steps of a loop. With a
+    stop moved by 2 %, the valve no longer shuts or opens as before. Viscous friction trades with
+    the lag and changes with temperature, so its limit is a factor of 2.
     """
 
     spring_change: float = 0.15
@@ -99,10 +99,10 @@ def stop_findings(
 ) -> Iterator[Finding]:
     """Find stops that have surely moved by more than a share of the travel.
 
-    A stop that only the present record met is compared with how far the stem went in that of the
-    baseline: where it went further, travel has been lost. Where the stem has gone beyond a stop of
-    the baseline, that has moved outward. A stop that has stayed excludes the zero of the position
-    sensor for the other, and leaves its span; where only one was met, it may be either.
+    A stop that only the present record met is compared with the range of motion of the baseline: if
+    the baseline went farther, travel is lost. A baseline stop that the stem has now passed has
+    moved outward. If the other stop has not moved, the zero of the position sensor is excluded as a
+    cause, and its span remains. If only this stop is comparable, either may be the cause.
     """
     bound = share * valve.travel
     moved = _moved(now, healthy, bound)
@@ -144,7 +144,7 @@ def _moved(
 
 
 class ValveDiagnosis(NamedTuple):
-    """Diagnosis of a valve: of its friction, and what else is found."""
+    """Diagnosis of the friction of a valve, and its other findings."""
 
     friction: Diagnosis
     findings: tuple[Finding, ...]
@@ -153,9 +153,9 @@ class ValveDiagnosis(NamedTuple):
 def diagnose_valve(
     result: Result, baseline: Baseline | None, limits: FrictionLimits | None = None
 ) -> ValveDiagnosis:
-    """Compare a result with the baseline: its friction (`diagnose`), and its other numbers.
+    """Compare friction (`diagnose`) and other numbers of a result with the baseline.
 
-    Where one factor explains friction and spring together, the diagnosis of the friction says so.
+    The diagnosis of the friction states if a common factor explains both friction and spring.
     """
     friction = diagnose(result, result.valve, baseline, limits)
     if baseline is None or not baseline.numbers:
@@ -171,9 +171,9 @@ def diagnose_valve(
 def diagnose_parameters(
     result: Result, baseline: Baseline | None, limits: ValveLimits | None = None
 ) -> tuple[Finding, ...]:
-    """Compare what a result says of its valve with the baseline (`diagnose_numbers`).
+    """Compare the numbers of a valve in a result with the baseline (`diagnose_numbers`).
 
-    Nothing is found without a baseline, or by one that holds a friction alone.
+    The result is empty without a baseline, or with a baseline of friction alone.
 
     Examples
     --------
@@ -200,12 +200,12 @@ def diagnose_numbers(
     valve: Valve,
     limits: ValveLimits | None = None,
 ) -> tuple[Finding, ...]:
-    """Compare the numbers of a valve with those of its baseline.
+    """Compare the numbers of a valve with its baseline.
 
     Parameters
     ----------
     numbers : mapping of str to Measured
-        What the latest result says of the valve (`valve_numbers`).
+        Present numbers of the valve (`valve_numbers`).
     baseline : Baseline
         The healthy valve.
     valve : Valve
@@ -216,9 +216,9 @@ def diagnose_numbers(
     Returns
     -------
     tuple of Finding
-        One for each change that is surely beyond its bound, with what to check. A number that
-        either side lacks is not compared. Causes that a record cannot tell apart are all named;
-        those that another number excludes are not.
+        A finding for each change that is surely beyond its bound, with what to check. A number that
+        either side lacks is not compared. A finding names all causes that a record cannot tell
+        apart, except those that another number excludes.
     """
     case = _Case(
         numbers,
@@ -242,7 +242,7 @@ def diagnose_numbers(
 
 @dataclass(frozen=True)
 class _Case:
-    """Numbers now and of the baseline, with their changes."""
+    """Present and baseline numbers, with their changes."""
 
     now: Mapping[str, Measured]
     healthy: Mapping[str, Measured]
@@ -278,9 +278,9 @@ def _check(statement: Statement, *numbers: str) -> Finding:
 
 
 def _common_scale(case: _Case, factor: Measured) -> Iterator[Finding]:
-    """Find that all forces have changed by one factor, as by another scale of the drive.
+    """Find that all forces have changed by a common factor, as if the scale of the drive changed.
 
-    A change that would be the failure of a spring stays one, as nothing proves that it is sound.
+    A change as large as a spring failure remains an ERROR: nothing proves that the spring is sound.
     """
     share = case.limits.spring_failure
     found = _check(
@@ -314,9 +314,9 @@ def _spring(case: _Case) -> Iterator[Finding]:
 
 
 def _is_scale_excluded(case: _Case, spring: Measured) -> bool:
-    """Return whether the distance of the stops contradicts a new scale of the position sensor.
+    """Return whether the distance of the stops excludes a new scale of the position sensor.
 
-    A scale s makes it s times as long, and the spring constant 1/s times as large.
+    A scale s multiplies the distance by s and the spring constant by 1/s.
     """
     if not {"lower_stop", "upper_stop"} <= case.changes.keys():
         return False
@@ -361,10 +361,10 @@ def _preload(case: _Case) -> Iterator[Finding]:
 
 
 def _preload_causes(case: _Case, shift: Measured) -> tuple[Statement, ...]:
-    """Return what may have shifted the balance, but for what another number excludes.
+    """Return the possible causes of a shift of the balance that no other number excludes.
 
-    A reading of the pressure that is too high by e adds A·e to the preload; one of the position by
-    b takes k·b from it.
+    A pressure reading too high by e adds A·e to the preload. A position reading too high by b
+    subtracts k·b.
     """
     stiffness = case.healthy["spring_constant"].value
     moved = shift.times(-1.0 / stiffness)
@@ -391,7 +391,7 @@ def _preload_causes(case: _Case, shift: Measured) -> tuple[Statement, ...]:
 
 
 def _slip(case: _Case, factor: Measured | None) -> Iterator[Finding]:
-    """Find that the slip jump has grown, unless all forces have by a factor that explains it."""
+    """Find growth of the slip jump, unless a common factor of all forces explains it."""
     growth, bound = case.changes.get("slip_force"), case.limits.slip_change * case.spring_force
     if growth is None or not growth.low > bound:
         return
@@ -403,7 +403,7 @@ def _slip(case: _Case, factor: Measured | None) -> Iterator[Finding]:
 
 
 def _viscous(case: _Case, factor: Measured | None) -> Iterator[Finding]:
-    """Find that viscous friction has changed, unless all forces have alike."""
+    """Find a change of viscous friction, unless a common factor of all forces explains it."""
     ratio, bound = case.changes.get("viscous_friction"), case.limits.viscous_factor
     way = 0 if ratio is None else ratio.beyond(1 / bound, bound)
     is_explained = factor is not None and ratio is not None and ratio.agrees_with(factor)
@@ -421,7 +421,7 @@ def _asymmetry(case: _Case) -> Iterator[Finding]:
 
 
 def _noises(case: _Case, has_scaled: bool) -> Iterator[Finding]:
-    """Find noise that has grown; a new scale of the drive explains its noise where it agrees."""
+    """Find growth of noise, unless a new scale of the drive explains the noise of the drive."""
     signals = {"drive_noise": case.drive, "stem_noise": "STEM"}
     for name, signal in signals.items():
         ratio = case.changes.get(name)
@@ -442,11 +442,11 @@ def _lag(case: _Case) -> Iterator[Finding]:
 
 
 _COMMON_SHARE = 0.3
-"""Share by which the upper end of a ratio may lie above the lower, to speak for a common factor."""
+"""Largest excess of the upper end of a ratio over the lower, as a share, for a common factor."""
 
 
 def drive_scale(valve: Valve) -> Statement:
-    """Return what scales all forces of a valve alike."""
+    """Return the quantities that scale all forces of a valve."""
     code = Code.AREA_AND_SCALE if valve.driven_by is Drive.PRESSURE else Code.SCALE
     return said(code, drive=valve.driven_by.name)
 
@@ -458,9 +458,9 @@ def spring_change(changes: Mapping[str, Measured], limits: ValveLimits) -> Measu
 
 
 def common_factor(changes: Mapping[str, Measured], limits: ValveLimits) -> Measured | None:
-    """Return the factor by which all forces have changed, as by another scale of the drive.
+    """Return the common factor of change of all forces, as if the scale of the drive changed.
 
-    None where the spring constant has not surely changed, or the frictions not by its factor.
+    Return None if the spring constant has not surely changed, or the frictions not by its factor.
     """
     spring, coulomb = spring_change(changes, limits), changes.get("coulomb_friction")
     if spring is None or coulomb is None or coulomb.holds(1.0) or not _is_narrow(coulomb):
@@ -471,12 +471,12 @@ def common_factor(changes: Mapping[str, Measured], limits: ValveLimits) -> Measu
 
 
 def _is_narrow(ratio: Measured) -> bool:
-    """Return whether a ratio is known well enough to speak for a common factor."""
+    """Return whether a ratio is known well enough to support a common factor."""
     return ratio.low > 0 and ratio.high / ratio.low < 1 + _COMMON_SHARE
 
 
 def explains(factor: Measured | None, diagnosis: Diagnosis) -> bool:
-    """Return whether a common factor explains what a diagnosis finds on the friction."""
+    """Return whether a common factor explains the change of friction in a diagnosis."""
     ratio = diagnosis.ratio
     if factor is None or ratio is None or diagnosis.level < Level.WARN:
         return False
@@ -484,10 +484,10 @@ def explains(factor: Measured | None, diagnosis: Diagnosis) -> bool:
 
 
 def qualified(diagnosis: Diagnosis, factor: Measured | None, valve: Valve) -> Diagnosis:
-    """Return a diagnosis that says so where a common factor explains what it finds.
+    """Return a diagnosis that states if a common factor explains its finding.
 
-    The level stays, as nothing proves that the friction is healthy; the signal is to check the
-    function.
+    The level stays, as nothing proves that the friction is healthy. The status signal becomes
+    "check function".
     """
     if not explains(factor, diagnosis) or diagnosis.statement.code is Code.SCALED:
         return diagnosis

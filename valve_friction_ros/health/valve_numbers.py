@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""What a result says of the whole valve: parameters, ends of the stem's motion, sensors."""
+"""Numbers of the whole valve from a result: parameters, range of motion, sensor noise."""
 
 import contextlib
 import math
@@ -49,47 +49,47 @@ from valve_friction_ros.signals import (
 )
 
 _MEAN = 0.1
-"""Time, s, over which the stem is averaged."""
+"""Averaging time of the stem position, s."""
 
 _NEAR = 2e-3
-"""Share of the range within which the stem is at its end: a seat gives way a little."""
+"""Distance from an end, over the range, within which the stem is at the end: a seat yields."""
 
 _NOISE = 6.0
-"""Deviations of the averaged stem's noise within which it is there, too."""
+"""The same distance in deviations of the averaged noise; the larger of both applies."""
 
 _LEFT = 2.0
-"""Distance from the end, over that within which the stem is there, at which it has left it."""
+"""Distance at which the stem has left an end, over the distance within which it is at the end."""
 
 _SURELY = 2.0
 """Growth of the force over F_s − F_c: a stem that has jumped too far waits for twice as much."""
 
 _SMALLEST = 0.05
-"""Growth asked for at least, as a share of the force's range.
+"""Least growth of the force that proves a stop, over the range of the force.
 
-Chosen: within the near part of the way the force grows by the spring, too."""
+Chosen: within the distance that is taken as the end, the spring force grows, too."""
 _MOVING = 0.05
-"""Speed over the top speed from which the stem counts as moving."""
+"""Speed over the top speed from which the stem is moving."""
 
 _RECENT = 0.5
-"""Time, s, before an arrival from which the speed is taken: a lag of the stem is no longer."""
+"""Time, s, before an arrival over which the highest speed is taken; no lag of a stem is longer."""
 
 
 def stem_reach(recording: Recording, valve: Valve, slip_force: float) -> dict[str, Measured]:
     """Return the ends of the stem's motion, m, and which of them are stops.
 
-    A stem that has come to rest moves on as soon as the force has grown by F_s − F_c in the same
-    direction. Where it rests at an end of its motion and the force grows by far more, a stop holds
-    it. Where F_s − F_c is unknown, the rests between the ends show it; without one it is taken to
-    be no larger than F_c.
+    A stem at rest moves on as soon as the force has grown by F_s − F_c in the same direction. If it
+    rests at an end of its motion while the force grows by far more, a stop holds it. An unknown
+    F_s − F_c is estimated from rests between the ends. Without such a rest, growth by F_c is
+    required.
 
     Parameters
     ----------
     recording : Recording
         Drive and stem.
     valve : Valve
-        Makes the force from the drive.
+        Converts the drive to force.
     slip_force : float
-        Largest F_s − F_c that there may be, N; nan where it is unknown.
+        Largest possible F_s − F_c, N; nan where it is unknown.
 
     Returns
     -------
@@ -103,7 +103,7 @@ def stem_reach(recording: Recording, valve: Valve, slip_force: float) -> dict[st
     )
     noise = sensor_noise(recording.position) / math.sqrt(mean)
     sent = recording.position if recording.stamped is None else recording.stamped.position.value
-    step = quantisation_step(sent)  # on the grid of the record it may be interpolated away
+    step = quantisation_step(sent)  # interpolation to the record's grid may hide it
     near = max(_NEAR * float(np.ptp(position)), _NOISE * noise, step)
     least: NDArray[np.float64] = np.full(position.size, _SURELY * slip_force)
     if math.isnan(slip_force):
@@ -126,10 +126,10 @@ def stem_reach(recording: Recording, valve: Valve, slip_force: float) -> dict[st
 def _unknown_growth(
     position: NDArray[np.float64], force: NDArray[np.float64], period: float, near: float
 ) -> NDArray[np.float64]:
-    """Return the growth of the force, N, that proves a stop where nothing is known of F_s − F_c.
+    """Return the growth of the force, N, that proves a stop where F_s − F_c is unknown.
 
-    It is F_c, or twice the largest F_s − F_c that a rest between the ends shows, and what the
-    viscous friction of an arrival, or a lag of the stem, add to it.
+    It is F_c, or twice the largest F_s − F_c of a rest between the ends if that is more. The force
+    of viscous friction, or of a lag of the stem, at an arrival is added.
     """
     speed = np.gradient(position, period)
     moving = np.abs(speed) > _MOVING * np.abs(speed).max()
@@ -145,7 +145,7 @@ def _friction(
 ) -> tuple[float, float]:
     """Return Coulomb (N) and viscous friction (N·s/m) of the moving stem, by least squares.
 
-    A lag of the stem adds to the viscous part. Where either comes out below zero, all is Coulomb's.
+    A lag of the stem adds to the viscous part. If either is negative, Coulomb friction takes all.
     """
     columns = [position - position.mean(), np.ones(position.size), np.sign(speed), speed]
     (*_, coulomb, viscous), *_ = np.linalg.lstsq(np.column_stack(columns), force, rcond=None)
@@ -162,9 +162,9 @@ def _slip_of_rests(
     near: float,
     coulomb: float,
 ) -> float:
-    """Return the largest F_s − F_c, N, that a rest between the ends shows; 0 without one.
+    """Return the largest F_s − F_c, N, of the rests between the ends; 0 without a rest.
 
-    The force changes by that before the stem moves on, and by F_s + F_c before it turns.
+    The force changes by F_s − F_c before the stem moves on, and by F_s + F_c before it reverses.
     """
     low, high = float(np.min(position)) + near, float(np.max(position)) - near
     largest = 0.0
@@ -202,20 +202,20 @@ def _held(
 
 _FEWEST = 200
 _LIKE_WHITE = 1.25
-"""Noise of every second sample over that of all, up to which it counts.
+"""Largest ratio of the noise of every second sample to the noise of all samples.
 
-It is 1 for white noise. Where it is more, the noise has a memory, or the signal itself moves as
-much from sample to sample: the number then depends on rate and drive, and not on the sensor."""
+White noise has 1. Above it, the noise is correlated, or the signal itself moves as much from sample
+to sample: the number then depends on rate and drive rather than on the sensor."""
 
 _FINEST = 1e-4
-"""Share of the signal's range below which a noise is not told apart from none."""
+"""Share of the signal's range below which noise is indistinguishable from zero."""
 
 
 def sensor_noises(recording: Recording) -> dict[str, Measured]:
     """Return ``drive_noise`` (Pa or N) and ``stem_noise`` (m), standard deviations.
 
-    One that depends on rate or drive is left out. Of one below the resolution, which grows with the
-    stroke, only that is known: its interval goes from zero to the resolution.
+    A noise that depends on rate or drive is left out. A noise below the resolution, which grows
+    with the stroke, has an interval from zero to the resolution.
     """
     if (stamped := recording.stamped) is not None:
         signals = stamped.drive, stamped.position
@@ -245,10 +245,10 @@ def _noise(signal: StampedSignal) -> Measured | None:
 
 
 SHARED = "sliding_friction_shared"
-"""Part of the half width of a sliding friction, N, by which other records are wrong alike."""
+"""Part of the half width of a sliding friction, N, that other records share as a common error."""
 
 OF_ONE_RESULT = (SHARED, SPEED_EXPONENT)
-"""Numbers that belong to the sliding friction of their own result, and to no other."""
+"""Numbers valid only for the sliding friction of their own result."""
 
 COMPARED = (
     "spring_constant",
@@ -258,42 +258,43 @@ COMPARED = (
     "viscous_friction",
     "viscous_asymmetry",
 )
-"""Parameters of a result that are compared with those of a baseline."""
+"""Parameters of a result that are compared with a baseline."""
 
 IDENTIFIED_ONLY = ("viscous_friction",)
 """Parameters that are compared only where they are identified.
 
-A weak viscous friction is not told apart from a lag, or from a friction that falls with the speed,
-and changes with either, and with the motion."""
+A weak viscous friction cannot be distinguished from a lag or from friction that falls with speed.
+It changes with either, and with the motion."""
 
 _COULOMB = "coulomb_friction"
 _DOUBTED = "slip_force"
 _OF_THE_BALANCE = ("spring_constant", "spring_preload")
 _SLIP_SHARE = 0.5
-"""Share of a slip force by which it may be too large, whatever the law of the friction.
+"""Share of a slip force by which it may be wrong, whatever the law of the friction.
 
-Chosen: on simulated valves whose friction falls with the speed, 0.4 to 1 of F_s − F_c was found."""
+Chosen: on simulated valves whose friction falls with speed, 0.4 to 1 of F_s − F_c was found."""
 
 _SURE_SPRING = 0.1
-"""Half width of the spring constant, as a share, up to which the numbers of a fit count.
+"""Largest relative half width of the spring constant at which the numbers of a fit are used.
 
-Chosen. Where the spring is known no better, the record leaves open what is spring and what is
-friction, and all numbers of the fit depend on that."""
+Chosen. Above it, the record does not separate spring from friction, and all numbers of the fit
+depend on both."""
 
 
 def valve_numbers(result: Result) -> dict[str, Measured]:
-    """Return all that a result has measured of the valve, by name, SI units.
+    """Return all numbers that a result has measured of the valve, by name, SI units.
 
-    Parameters are there where they are identified or weak (but `IDENTIFIED_ONLY`), the preload with
-    any interval, without the uncertainties of area and sensor scales, which two records of the same
-    sensors share; not where the model does not describe the valve, but for the slip jump, which may
-    be why, and for spring and preload where the force balance has identified them, or where the
-    spring constant is known to no better than 10 %. The others are:
+    Parameters are included where they are identified or weak (`IDENTIFIED_ONLY` where identified),
+    and the preload with any interval. Their intervals leave out the uncertainties of area and
+    sensor scales, which two records of the same sensors share. No parameter is included where the
+    spring constant is known to worse than 10 %. Where the model does not describe the valve, only
+    the slip force, which may be the reason, and an identified spring and preload are included. The
+    others are:
 
     - ``slip_force``, F_s − F_c, N; ``viscous_asymmetry``; ``lag`` of the stem, s;
     - ``lowest_position``, ``highest_position``, and the stops that were met (`stem_reach`);
     - ``drive_noise`` and ``stem_noise`` (`sensor_noises`);
-    - what the comparison of its sliding friction needs (`comparable_numbers`).
+    - the numbers for the comparison of its sliding friction (`comparable_numbers`).
     """
     known = {name: one for name, each in result.parameters.items() if (one := _measured(each))}
     fit = fit_numbers(known)
@@ -314,7 +315,7 @@ def valve_numbers(result: Result) -> dict[str, Measured]:
 
 
 def comparable_numbers(evidence: Mapping[str, Any]) -> dict[str, Measured]:
-    """Return what a comparison needs of the evidence of a result: `OF_ONE_RESULT`."""
+    """Return the numbers of `OF_ONE_RESULT` from the evidence of a result."""
     told = evidence.get(COMPARABLE, {})
     numbers = {}
     if told.get("shared_half_width", 0.0) > 0:
@@ -325,9 +326,9 @@ def comparable_numbers(evidence: Mapping[str, Any]) -> dict[str, Measured]:
 
 
 def fit_numbers(known: Mapping[str, Measured]) -> dict[str, Measured]:
-    """Return what known parameters say of a valve: `COMPARED` and ``slip_force``, F_s − F_c.
+    """Return the known parameters of `COMPARED`, and ``slip_force``, F_s − F_c.
 
-    There is nothing where the spring constant is not known well enough.
+    The result is empty where the spring constant is not known well enough.
     """
     spring = known.get("spring_constant")
     if spring is None or spring.share > _SURE_SPRING:
@@ -344,8 +345,8 @@ def fit_numbers(known: Mapping[str, Measured]) -> dict[str, Measured]:
 def _measured(one: Parameter) -> Measured | None:
     """Return a parameter without its calibration, where it is identified or weak.
 
-    Of one that is compared by its difference, zero is a value as good as any: its interval counts
-    though it is wider than the value.
+    A parameter compared by its difference may well be zero, so an interval wider than the value is
+    accepted.
     """
     one = one.without_calibration
     if one.verdict is Verdict.NOT_IDENTIFIABLE and one.name in DIFFERENCES:
@@ -360,10 +361,10 @@ def _imperfections(
 ) -> dict[str, Measured]:
     """Return slip force, asymmetry and lag, as the method found them.
 
-    A slip force is known no better than F_c, from which it is counted, or to `_SLIP_SHARE` of
-    itself. Sliding, the stem stands (F_v/k)·ẋ behind where it would be without viscous friction,
-    and a lag τ shows it τ·ẋ behind: so the lag is known no better than F_v/k, and not at all
-    without F_v.
+    A slip force starts from F_c: the smaller of the half width of F_c and `_SLIP_SHARE` of the slip
+    force is added to its interval. Viscous friction delays a sliding stem by (F_v/k)·ẋ, and a lag τ
+    shows it late by τ·ẋ. The lag is therefore known no better than F_v/k, and not at all without
+    F_v.
     """
     found = {
         name: Measured(one["value"], one["half_width"])
@@ -380,14 +381,14 @@ def _imperfections(
 
 
 class RefusedRecordError(RefusalError):
-    """A refusal, with what its record shows all the same.
+    """A refusal, with the numbers that its record shows nevertheless.
 
     Attributes
     ----------
     numbers : mapping of str to Measured
         Numbers of the valve by name, SI units (`numbers_of_refused`).
     is_fault : bool
-        Whether the record cannot be used, rather than shows too little motion.
+        Whether the record is unusable, rather than short of motion.
     """
 
     def __init__(
@@ -397,17 +398,17 @@ class RefusedRecordError(RefusalError):
         self.numbers, self.is_fault = numbers, is_fault
 
     def __reduce__(self) -> tuple[object, ...]:
-        """Let it pass from process to process."""
+        """Support pickling with all arguments."""
         return type(self), (str(self), self.numbers, self.is_fault)
 
 
 def numbers_of_refused(
     recording: Recording, valve: Valve, settings: IdentificationSettings
 ) -> dict[str, Measured]:
-    """Return what a refused record shows of its valve: noise of the sensors, ends of the stem.
+    """Return sensor noises and ends of the stem's motion from a refused record.
 
-    Signals of an impossible size say nothing. The ends of the stem's motion are there only where
-    the stem moved both ways and with the drive.
+    Signals of an impossible size give nothing. The ends of the motion require a stem that moved
+    both ways and with the drive.
     """
     numbers: dict[str, Measured] = {}
     with contextlib.suppress(RefusalError, ValueError):
