@@ -103,13 +103,13 @@ LONGER = "before any work, identify it again from a longer record"
 @pytest.mark.parametrize(
     ("friction", "share", "word", "effect", "advice"),
     [
-        (400.0, 0.01, "is excessive", "14 %", "plan work on the packing now"),
-        (150.0, 0.02, "has grown", "5.2 %", "plan work on the packing for the next stop"),
+        (400.0, 0.01, "is excessive", "14 %", "replace the packing as soon as possible"),
+        (150.0, 0.02, "has grown", "5.2 %", "plan to replace the packing at the next shutdown"),
         (30.0, 0.01, "has collapsed", "1 %", "check the packing for leakage now"),
-        (70.0, 0.01, "has fallen", "2.4 %", "look at the packing at the next stop"),
+        (70.0, 0.01, "has fallen", "2.4 %", "check the packing for leakage on the next round"),
         (102.0, 0.02, "is normal", "3.6 %", "no action is needed"),
-        (150.0, 0.5, "cannot be told from before", "5.2 %", LONGER),
-        (75.0, 0.4, "cannot be told from before", "2.6 %", LONGER),
+        (150.0, 0.5, "may have changed", "5.2 %", LONGER),
+        (75.0, 0.4, "may have changed", "2.6 %", LONGER),
     ],
 )
 def test_against_a_baseline(with_friction, friction, share, word, effect, advice):
@@ -132,7 +132,7 @@ def test_without_a_baseline(with_friction):
 
 def test_a_weak_or_a_given_number_is_called_so(with_friction):
     weak = with_friction(400.0, 30.0, Verdict.WEAK, "two strokes only", baseline=BASELINE)
-    assert ", with the verdict weak (two strokes only), and the stem" in diagnosis_sentence(weak)
+    assert ", but this value is weak (two strokes only), and the stem" in diagnosis_sentence(weak)
     given = with_friction(150.0, 0.0, Verdict.FIXED, "given")
     assert diagnosis_sentence(given).startswith(
         "The friction is 150 N, which was given and not identified, and the stem"
@@ -148,7 +148,7 @@ def test_what_is_not_identifiable_has_no_number(with_friction):
 def test_an_impossible_friction_names_the_signals(with_friction):
     assert diagnosis_sentence(with_friction(-20.0, baseline=BASELINE)) == (
         "The identified friction is -20 N, but friction cannot be negative: check the direction "
-        "of both signals and identify it again."
+        "of both signals, and identify it again."
     )
 
 

@@ -171,6 +171,14 @@ class Statement:
         facts = {name: _restored(one) for name, one in kept.items() if name != "code"}
         return cls(code, facts)
 
+    @property
+    def innermost(self) -> "Statement":
+        """The statement inside those that only date or doubt it."""
+        told = self
+        while isinstance(inner := told.facts.get("of"), Statement):
+            told = inner
+        return told
+
     def __hash__(self) -> int:
         """Return one of code and facts, as statements that are counted need it."""
         return hash((self.code, frozenset(self.facts.items())))
@@ -204,7 +212,18 @@ def _restored(fact: Any) -> Any:
 
 def sentence(statement: Statement) -> str:
     """Write a statement, without a full stop."""
-    return _WRITER.vformat(_SENTENCES[statement.code], (), statement.facts)
+    facts = {**statement.facts, "advice": _advice(statement)}
+    return _WRITER.vformat(_SENTENCES[statement.code], (), facts)
+
+
+def _advice(statement: Statement) -> str:
+    template = _CHECKS.get(statement.code, "")
+    return _WRITER.vformat(template, (), statement.facts)
+
+
+def finding_advice(statement: Statement) -> str:
+    """Write what to do about a finding beside the friction; empty where nothing is known."""
+    return _advice(statement.innermost)
 
 
 def headline(statement: Statement) -> str:
@@ -497,7 +516,7 @@ _TABLES: dict[str, Mapping[str, str]] = {
         "UNKNOWN": "",
         "IMPOSSIBLE": "friction below zero",
         "NORMAL": "friction normal",
-        "UNCLEAR": "friction cannot be distinguished from its baseline",
+        "UNCLEAR": "friction may have changed",
         "GROWN": "friction has grown",
         "EXCESS": "excess friction",
         "FALLEN": "friction has fallen",
@@ -641,48 +660,40 @@ _SENTENCES = {
     "than a factor of {factor:g} apart; " + _SET_BASELINE,
     Code.COMMON_SCALE: "spring constant and friction have both changed to {change:times} the "
     "baseline: a common factor points to {scale} rather than to spring and "
-    "packing at once; check them",
+    "packing at once; {advice}",
     Code.SPRING_CHANGED: "the spring constant has changed{with_preload:? together with its "
-    "preload}: {change:times} the baseline, now {value:.4g} N/m: check the "
-    "spring{causes:list , and | and |, which would have the same effect}",
+    "preload}: {change:times} the baseline, now {value:.4g} N/m: {advice}",
     Code.BALANCE_SHIFTED: "the force balance has shifted: spring preload {change:by N}, "
-    "{share:percent} of the spring's force over the travel; check "
-    "{causes:list | or |}",
+    "{share:percent} of the spring's force over the travel; {advice}",
     Code.BENCH_SET: "the bench set",
     Code.DRIVE_ZERO: "the zero of the {drive:drive} sensor ({reading:+.3g} {unit})",
     Code.POSITION_ZERO: "the zero of the position sensor ({reading:in +.2g mm} mm){stops:of stops}",
     Code.UNEVEN_PACKING: "packing with more friction {upward:?up|down}ward",
     Code.SLIP_GROWN: "the slip jump has grown: static friction exceeds sliding friction by "
     "{change:by N} more than in the baseline, and the stem jumps by "
-    "{share:percent} of its travel; check packing, stem and guides for sticking",
+    "{share:percent} of its travel; {advice}",
     Code.VISCOUS_CHANGED: "viscous friction has {grown:?grown|fallen} to {change:times} the "
-    "baseline: check packing and lubricant, and the air path of the "
-    "actuator; a change in lag between the signals would look similar",
+    "baseline: {advice}; a change in lag between the signals would look similar",
     Code.ASYMMETRY_CHANGED: "viscous friction has grown {upward:?up|down}ward (share "
-    "{change:by}): check stem and packing for one-sided wear, and the air "
-    "path for a restriction that acts in one direction only",
+    "{change:by}): {advice}",
     Code.NOISE_GROWN: "the noise of the {signal:of signal} has grown to {change:times} the "
-    "baseline: check the sensor, its cable, its supply and its mounting",
+    "baseline: {advice}",
     Code.LAG_CHANGED: "the lag of the stem behind the {drive:drive} has {later:?grown|shrunk}, "
-    "{change:by ms}: check filters and clocks of both sensors, and tubing and volume between "
-    "sensor and actuator; a change in viscous friction would look similar",
+    "{change:by ms}: {advice}; a change in viscous friction would look similar",
     Code.STOPS_MOVED_ALIKE: "both travel stops have shifted by {change:by mm}: the zero of the "
-    "position sensor or its coupling to the stem has shifted; check its "
-    "mounting",
+    "position sensor or its coupling to the stem has shifted; {advice}",
     Code.TRAVEL_LOST: "travel is lost at the {stop:of end}: the stem stops {change:by mm} from "
-    "its former stop; check for dirt or a foreign part in the trim, an adjusted "
-    "stop, and the {sensor:of sensor} of the position sensor",
+    "its former stop; {advice}",
     Code.STOP_MOVED_OUTWARD: "the travel stop at the {stop:of end} has moved outward by "
-    "{change:by mm}: check seat and plug for wear, check stop and "
-    "coupling, and the {sensor:of sensor} of the position sensor",
+    "{change:by mm}: {advice}",
     Code.STOOD_STILL: "the stem has not moved from {position:in .1f mm} mm since {since:minute} "
     "although its {drive:drive} changed by {change:.3g} {unit}: it is held by "
     "more than {ratio:.2g} times the friction of the baseline, by a part in the "
-    "trim or by a lock, or the position sensor has failed; inspect the stem",
+    "trim or by a lock, or the position sensor has failed; {advice}",
     Code.HELD_IN_TEST: "the stem stayed at {position:in .1f mm} mm in a test although the force "
     "should have moved it: static friction is at least {friction:.3g} N, "
     "{ratio:.2f} times the friction of the baseline, or the stem is blocked; "
-    "inspect the stem and repeat the test with more force",
+    "{advice}",
     Code.BUFFER_CLEARED: "{because}: the buffer was cleared",
     Code.CLEARED_ON_REQUEST: "on request",
     Code.CLEARED_AS_SETTINGS: "valve or window parameters were changed",
@@ -765,27 +776,62 @@ _HEADLINES = {
 }
 
 
+_CHECKS = {
+    Code.COMMON_SCALE: "check them",
+    Code.SPRING_CHANGED: "check the spring{causes:list , and | and |, which would have the same "
+    "effect}",
+    Code.BALANCE_SHIFTED: "check {causes:list | or |}",
+    Code.SLIP_GROWN: "check packing, stem and guides for sticking",
+    Code.VISCOUS_CHANGED: "check packing and lubricant, and the air path of the actuator",
+    Code.ASYMMETRY_CHANGED: "check stem and packing for one-sided wear, and the air path for a "
+    "restriction that acts in one direction only",
+    Code.NOISE_GROWN: "check the sensor, its cable, its supply and its mounting",
+    Code.LAG_CHANGED: "check filters and clocks of both sensors, and tubing and volume between "
+    "sensor and actuator",
+    Code.STOPS_MOVED_ALIKE: "check its mounting",
+    Code.TRAVEL_LOST: "check for dirt or a foreign part in the trim, an adjusted stop, and the "
+    "{sensor:of sensor} of the position sensor",
+    Code.STOP_MOVED_OUTWARD: "check seat and plug for wear, check stop and coupling, and the "
+    "{sensor:of sensor} of the position sensor",
+    Code.STOOD_STILL: "inspect the stem",
+    Code.HELD_IN_TEST: "inspect the stem and repeat the test with more force",
+}
+"""What to do about a finding, the part {advice} of its sentence."""
+
+_OF_FRICTION = {
+    "EXCESS": "replace the packing as soon as possible; keep the loop in manual if it oscillates",
+    "GROWN": "plan to replace the packing at the next shutdown",
+    "FALLEN": "check the packing for leakage on the next round",
+    "COLLAPSED": "check the packing for leakage now",
+    "UNCLEAR": "before any work, identify it again from a longer record with more strokes",
+    "IMPOSSIBLE": "check the direction of both signals, and identify it again",
+}
+
+
+def friction_advice(state: str) -> str:
+    """Return what to do in a state of the friction, by its name; empty if nothing."""
+    return _OF_FRICTION.get(state, "")
+
+
 _ADVICE = {
-    ("friction_high", "WARN"): "Plan to replace the packing at the next shutdown.",
-    (
-        "friction_high",
-        "ERROR",
-    ): "Replace the packing at the next shutdown; keep the loop in manual if it oscillates.",
-    ("friction_low", "WARN"): "Check the packing for leakage on the next round.",
-    ("friction_low", "ERROR"): "Check the packing for leakage now.",
-    (
-        "stuck",
-        "",
-    ): "Put the loop in manual, stroke the valve locally, and check packing, trim and actuator.",
-    ("whole_valve", ""): "Check the part named in the message at the next opportunity.",
-    (
-        "data_quality",
-        "",
-    ): "Check the sensor and its connection; the valve is not monitored until this is fixed.",
-    ("positioner", ""): "Check the positioner and its air supply, and the tuning of the loop.",
+    "stuck": "put the loop in manual, stroke the valve locally, and check packing, trim and "
+    "actuator",
+    "whole_valve": "check the part named in the message at the next opportunity",
+    "data_quality": "check the sensor and its connection; the valve is not monitored until this "
+    "is fixed",
+    "positioner": "check the positioner and its air supply, and the tuning of the loop",
+}
+
+_STATE_OF_ALARM = {
+    ("friction_high", "WARN"): "GROWN",
+    ("friction_high", "ERROR"): "EXCESS",
+    ("friction_low", "WARN"): "FALLEN",
+    ("friction_low", "ERROR"): "COLLAPSED",
 }
 
 
 def alarm_advice(kind: str, level: str) -> str:
-    """Return what to do about an alarm, by its name and the name of its level."""
-    return _ADVICE.get((kind, level)) or _ADVICE.get((kind, ""), "")
+    """Return what to do about an alarm as a sentence, by its name and the name of its level."""
+    state = _STATE_OF_ALARM.get((kind, level), "")
+    advice = friction_advice(state) or _ADVICE.get(kind, "")
+    return advice and f"{advice[0].upper()}{advice[1:]}."

@@ -413,22 +413,54 @@ def test_a_friction_that_grows_is_raised_once_and_cleared_once():
     hold, shown, share = FrictionHold(), [], 0.1
     growth = [*np.linspace(1, 1.8, 40), *np.linspace(1.8, 1, 40)]
     for day, value in enumerate(growth):
-        hold = hold.looked(diagnosis(ratio(value, share)), START + day * NANO_DAY, LIMITS)
+        found, time = diagnosis(ratio(value, share)), START + day * NANO_DAY
+        hold = hold.looked(found, time, LIMITS, elapsed=NANO_DAY if day else None)
         shown.append(hold.conditions[Side.HIGH].level)
     assert sum(a != b for a, b in itertools.pairwise(shown)) == 2
     assert max(shown) is Level.WARN
     assert hold.conditions[Side.LOW] == NO_CONDITION
 
 
-def test_only_newer_looks_count_and_what_compares_nothing_changes_nothing():
+def test_what_compares_nothing_changes_nothing():
     grown = diagnosis(ratio(1.6, 0.05))
     hold = FrictionHold().looked(grown, START, LIMITS)
     assert hold.conditions[Side.HIGH].level is Level.WARN
-    normal = diagnosis(ratio(1.0, 0.05))
-    assert hold.looked(normal, START, LIMITS) is hold
     unknown = Diagnosis(Level.OK, StatusSignal.GOOD, quoted("no comparison"), None)
     assert hold.looked(unknown, START + NANO_DAY, LIMITS) is hold
+    normal = diagnosis(ratio(1.0, 0.05))
     assert hold.looked(normal, START + NANO_DAY, LIMITS).conditions[Side.HIGH] == NO_CONDITION
+
+
+@given(RATIOS, st.integers(1, 10 * NANO_DAY))
+def test_a_record_asked_for_shows_the_level_of_its_diagnosis(found, later):
+    """However soon after the one before; one that repeats by itself needs more certainty."""
+    expected = diagnosis(found)
+    hold = FrictionHold().looked(diagnosis(ratio(1.0, 0.05)), START, LIMITS)
+    asked = hold.looked(expected, START + later, LIMITS)
+    side = expected.state.side
+    for one in Side:
+        level = expected.level if one is side else Level.OK
+        assert asked.conditions[one].level is level
+    again = asked.looked(expected, START + 2 * later, LIMITS)
+    assert again.conditions == asked.conditions
+
+
+def test_a_look_that_repeats_by_itself_needs_more_certainty():
+    hold = FrictionHold().looked(diagnosis(ratio(1.0, 0.05)), START, LIMITS)
+    found = diagnosis(ratio(2.4, 0.14))
+    minute = 60_000_000_000
+    assert hold.looked(found, START + minute, LIMITS).conditions[Side.HIGH].level is Level.ERROR
+    often = hold.looked(found, START + minute, LIMITS, elapsed=minute)
+    assert often.conditions[Side.HIGH].level is Level.WARN
+
+
+def test_an_active_alarm_does_not_read_as_normal():
+    """Uncertainty keeps the alarm: its message says so, and what the latest record shows."""
+    hold = FrictionHold().looked(diagnosis(ratio(2.6, 0.05)), START, LIMITS)
+    after = hold.looked(diagnosis(ratio(1.1, 0.2)), START + NANO_DAY, LIMITS)
+    kept = after.conditions[Side.HIGH]
+    assert kept.level is Level.WARN
+    assert "; the latest record does not clear it: " in kept.message
 
 
 def test_a_friction_too_small_to_be_identified_is_low():

@@ -25,6 +25,7 @@ from valve_friction_ros.health.comparison import Ratio
 from valve_friction_ros.health.diagnosis import Diagnosis, FrictionLimits, Side
 from valve_friction_ros.health.levels import Finding, Level, StatusSignal, by_severity
 from valve_friction_ros.health.measured import Measured
+from valve_friction_ros.wording import Code, quoted, said, sentence
 
 _YEAR = 365.25 * 86_400e9
 _A_YEAR = 0.01
@@ -143,19 +144,17 @@ class FrictionHold:
     def looked(
         self, diagnosis: Diagnosis, time: int, limits: FrictionLimits, elapsed: int | None = None
     ) -> "FrictionHold":
-        """Take a look at the friction at a time, ns; a look older than the latest changes nothing.
+        """Take a look at the friction at a time, ns.
 
-        A diagnosis that compares nothing leaves the conditions as they are. Give `elapsed`, the
-        time since the previous look in ns, where stamps do not show it: a record may be replayed.
+        A diagnosis that compares nothing leaves the conditions as they are. A look that repeats by
+        itself gives the time since the previous one, `elapsed`, ns, and needs more certainty the
+        more often it repeats (`widening`). A record that somebody asked for is judged by its 95 %
+        interval, as its diagnosis is.
         """
-        if elapsed is None and self.until is not None:
-            elapsed = time - self.until
-            if elapsed <= 0:
-                return self
         own = diagnosis.own
         if own.ratio is None and own.state.side is None:
             return self
-        wider = 1.0 if elapsed is None or self.until is None else widening(elapsed)
+        wider = 1.0 if elapsed is None else widening(elapsed)
         shown = {}
         for side, before in self.conditions.items():
             if own.ratio is not None:
@@ -167,8 +166,12 @@ class FrictionHold:
             elif level is Level.OK:
                 shown[side] = NO_CONDITION
             else:
-                shown[side] = Condition(level, _BY_SIDE[side, level], own.message)
-        return replace(self, conditions=shown, until=time)
+                statement = own.statement
+                if own.state.side is not side:
+                    active = quoted(before.message)
+                    statement = said(Code.STANDS_UNCERTAIN, alarm=active, latest=statement)
+                shown[side] = Condition(level, _BY_SIDE[side, level], sentence(statement))
+        return replace(self, conditions=shown, until=max(time, self.until or time))
 
 
 def farthest(now: Mapping[str, Measured], healthy: Mapping[str, Measured]) -> dict[str, Measured]:

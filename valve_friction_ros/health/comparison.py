@@ -47,10 +47,10 @@ that is added to the power law tangent at one of two speeds: 95 % of the same pa
 -0.13 and 0.32."""
 
 _WIDEST_STEP = math.log(1.5)
-"""Largest half width of the step from one speed to the other at which frictions are compared.
+"""Largest half width of the step from one speed to the other at which a friction is still known.
 
-Beyond it the speed alone may change friction by half, and the result reflects only the prior.
-Chosen."""
+Beyond it the speed alone may change friction by half. A comparison then shows only a change that
+no difference in speed explains. Chosen."""
 
 _NOTHING: Mapping[str, Measured] = MappingProxyType({})
 _COULOMB = "coulomb_friction"
@@ -145,6 +145,7 @@ def carried(
     speed: float,
     to: SlidingFriction,
     numbers: Mapping[str, Measured] = _NOTHING,
+    widest: float = _WIDEST_STEP,
 ) -> SlidingFriction | None:
     """Carry the sliding friction of a result to the speed of another.
 
@@ -153,8 +154,8 @@ def carried(
     gives the fall (`_USUAL_FALL`). The more precise of the two is combined with the prior of the
     exponent (`_USUAL_EXPONENT`). The interval widens with the distance of the speeds.
 
-    Returns None where no sliding friction is above zero, or the speeds are too far apart
-    (`_WIDEST_STEP`).
+    Returns None where no sliding friction is above zero, or the speeds are too far apart: the
+    half width of the step, as a logarithm, exceeds `widest`.
     """
     sliding = parameters.get(SLIDING)
     if sliding is None or not (sliding.value > 0 and sliding.half_width >= 0 and speed > 0):
@@ -164,7 +165,7 @@ def carried(
         return SlidingFriction(sliding.value, sliding.half_width, speed)
     shares = _viscous_shares(parameters.get("viscous_friction"), sliding.value / speed)
     step, doubt = _step(math.log(to.speed / speed), shares, numbers.get(SPEED_EXPONENT))
-    if doubt > _WIDEST_STEP:
+    if doubt > widest:
         return None
     value = sliding.value * math.exp(step)
     share = math.hypot(sliding.half_width / sliding.value, doubt)
@@ -222,6 +223,9 @@ def compared(
     scale both frictions, and a common scale cancels in the ratio. After a new calibration, set the
     baseline again.
 
+    Sliding frictions at speeds too far apart (`carried`) are compared only where their ratio
+    surely differs from 1: the interval includes all that the speeds may explain.
+
     Parameters
     ----------
     parameters : mapping of str to Parameter
@@ -241,7 +245,8 @@ def compared(
     by_sliding = by_coulomb = None
     if baseline.sliding is not None:
         healthy = baseline.sliding
-        now = carried(parameters, speed, healthy, numbers)
+        known = carried(parameters, speed, healthy, numbers)
+        now = known or carried(parameters, speed, healthy, numbers, math.inf)
         if now is not None:
             shared, healthy_shared = _shared(numbers, baseline.numbers, speed / healthy.speed)
             by_sliding = Comparison(
@@ -251,6 +256,8 @@ def compared(
                 healthy.speed,
                 (min(shared, now.half_width), min(healthy_shared, healthy.half_width)),
             )
+            if known is None and by_sliding.ratio.change == 0.0:
+                by_sliding = None
     coulomb = parameters[_COULOMB].without_calibration
     if baseline.coulomb_friction is not None and coulomb.value >= 0:
         by_coulomb = Comparison(

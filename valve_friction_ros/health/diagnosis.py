@@ -228,10 +228,12 @@ class Diagnosis:
     @property
     def survey(self) -> Survey:
         """Grade of a valve without a baseline in a first survey."""
-        told = self.statement
-        while isinstance(inner := told.facts.get("of"), Statement):
-            told = inner
-        return Survey[told.facts.get("survey", Survey.UNKNOWN.name)]
+        return Survey[self.statement.innermost.facts.get("survey", Survey.UNKNOWN.name)]
+
+    @property
+    def lacks_comparison(self) -> bool:
+        """Whether there is a baseline, but no friction comparable with it."""
+        return self.statement.innermost.code is Code.NOT_COMPARED
 
     @property
     def own(self) -> "Diagnosis":
@@ -494,6 +496,8 @@ def _by_size(
         first = said(Code.NO_BASELINE, effect=effect, survey=survey.name)
         return Diagnosis.of(FrictionState.UNKNOWN, first)
     reasons = tuple(_why_not_compared(one, result, baseline) for one in _frictions(result))
+    by_speed = tuple(one for one in reasons if one.code is Code.NOT_COMPARED_SPEED)
+    reasons = by_speed or reasons
     why = said(Code.NOT_COMPARED, baseline=baseline.statement, reasons=reasons, effect=effect)
     return Diagnosis.of(FrictionState.UNKNOWN, why)
 

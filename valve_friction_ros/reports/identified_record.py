@@ -42,7 +42,13 @@ from valve_friction_ros.model import Recording, Valve
 from valve_friction_ros.reports.page import Colour, Conclusion
 from valve_friction_ros.response import ResponseSummary
 from valve_friction_ros.usage import LimitState, ValveUsage
-from valve_friction_ros.wording import in_zone, percentage, with_width
+from valve_friction_ros.wording import (
+    finding_advice,
+    friction_advice,
+    in_zone,
+    percentage,
+    with_width,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,7 +153,7 @@ class IdentifiedRecord:
 _DATED = (1e9, 1e11)
 """Start times, s, that count from 1970: they lie between the years 2001 and 5138."""
 
-_ALARM_STATUS = {
+_STATUS = {
     FrictionState.EXCESS: Conclusion(Colour.RED, "Excess friction", "failure (NE 107: F)"),
     FrictionState.COLLAPSED: Conclusion(
         Colour.RED, "Friction has collapsed", "out of specification (NE 107: S)"
@@ -157,6 +163,9 @@ _ALARM_STATUS = {
     ),
     FrictionState.FALLEN: Conclusion(
         Colour.AMBER, "Friction has fallen", "maintenance required (NE 107: M)"
+    ),
+    FrictionState.UNCLEAR: Conclusion(
+        Colour.GREY, "Friction uncertain", "beyond a limit, but perhaps unchanged"
     ),
 }
 
@@ -177,8 +186,8 @@ def valve_status(record: IdentifiedRecord) -> Conclusion:
 
 def _of_friction(record: IdentifiedRecord) -> Conclusion:
     diagnosis = record.diagnosis
-    if diagnosis.state in _ALARM_STATUS:
-        return _ALARM_STATUS[diagnosis.state]
+    if diagnosis.state in _STATUS:
+        return _STATUS[diagnosis.state]
     if diagnosis.level >= Level.WARN:
         return Conclusion(Colour.AMBER, "Check sensors and model", "check function (NE 107: C)")
     if diagnosis.ratio is None:
@@ -217,24 +226,16 @@ class _Finding(NamedTuple):
     advice: str
 
 
-_AGAIN = "before any work, identify it again from a longer record with more strokes"
 _CHECK = "check the sensors and their mounting, then identify it again"
+_AS_BASELINE = "move the valve as its baseline was taken, and identify it again"
+_BASELINE = "set a baseline, the friction of the healthy valve"
 
-_ALARM_SENTENCES = {
-    FrictionState.EXCESS: _Finding(
-        "the friction is excessive, {ratio}",
-        "plan work on the packing now, and expect the loop to oscillate until then",
-    ),
-    FrictionState.COLLAPSED: _Finding(
-        "the friction has collapsed, {ratio}", "check the packing for leakage now"
-    ),
-    FrictionState.GROWN: _Finding(
-        "the friction has grown, {ratio}", "plan work on the packing for the next stop"
-    ),
-    FrictionState.FALLEN: _Finding(
-        "the friction has fallen, {ratio}", "look at the packing at the next stop: it may be worn"
-    ),
-    FrictionState.UNCLEAR: _Finding("the friction cannot be told from before, {ratio}", _AGAIN),
+_STATE_WORDS = {
+    FrictionState.EXCESS: "the friction is excessive, {ratio}",
+    FrictionState.COLLAPSED: "the friction has collapsed, {ratio}",
+    FrictionState.GROWN: "the friction has grown, {ratio}",
+    FrictionState.FALLEN: "the friction has fallen, {ratio}",
+    FrictionState.UNCLEAR: "the friction may have changed, {ratio}",
 }
 
 
@@ -250,18 +251,16 @@ def what_to_do(diagnosis: Diagnosis, findings: Sequence[Finding] = ()) -> str:
 
     Without a comparison it is that of the first survey, by absolute limits.
     """
-    alarm = _ALARM_SENTENCES.get(diagnosis.state)
-    if alarm is not None:
-        return alarm.advice
-    if findings:
-        return str(by_severity(findings)[0].message).rpartition(": ")[2]
-    if diagnosis.state is FrictionState.IMPOSSIBLE:
-        return "check the direction of both signals and identify it again"
-    if diagnosis.ratio is None:
-        return _SURVEY_ADVICE.get(
-            diagnosis.survey, "set a baseline, the friction of the healthy valve"
-        )
-    return "no action is needed"
+    advice = friction_advice(diagnosis.state.name)
+    if not advice and findings:
+        advice = finding_advice(by_severity(findings)[0].statement)
+    if advice:
+        return advice
+    if diagnosis.ratio is not None:
+        return "no action is needed"
+    if diagnosis.lacks_comparison:
+        return _AS_BASELINE
+    return _SURVEY_ADVICE.get(diagnosis.survey, _BASELINE)
 
 
 def diagnosis_sentence(record: IdentifiedRecord) -> str:
@@ -271,11 +270,11 @@ def diagnosis_sentence(record: IdentifiedRecord) -> str:
     monitor in words for readers outside control engineering.
     """
     friction = _friction(record)
-    alarm = _ALARM_SENTENCES.get(record.diagnosis.state)
-    if record.diagnosis.ratio is None and alarm is not None:
+    state = record.diagnosis.state
+    if record.diagnosis.ratio is None and state in _STATE_WORDS:
         vanished = next(one for one in _frictions(record) if math.isnan(one.value))
         size = f"at most {vanished.magnitude_bound:.2g} N, too small to be identified"
-        finding = _Finding(alarm.what.format(ratio=size), alarm.advice)
+        finding = _Finding(_STATE_WORDS[state].format(ratio=size), friction_advice(state.name))
     elif math.isnan(friction.value):
         finding = _Finding(
             f"this record does not determine the friction ({friction.reason})",
@@ -284,7 +283,7 @@ def diagnosis_sentence(record: IdentifiedRecord) -> str:
     elif friction.value < 0:
         finding = _Finding(
             f"the identified friction is {friction.value:.4g} N, but friction cannot be negative",
-            "check the direction of both signals and identify it again",
+            friction_advice(FrictionState.IMPOSSIBLE.name),
         )
     else:
         finding = _found(record)
@@ -316,9 +315,7 @@ def _found(record: IdentifiedRecord) -> _Finding:
     friction, diagnosis = _friction(record), record.diagnosis
     if diagnosis.ratio is None:
         size = with_width(friction.value, friction.half_width)
-        advice = "set a baseline, the friction of the healthy valve"
-        if record.baseline is not None:
-            advice = "move the valve as its baseline was taken, and identify it again"
+        advice = _BASELINE if record.baseline is None else _AS_BASELINE
         return _Finding(
             f"the friction is {size} N{_sureness(friction)}",
             f"to find out whether it has grown, {advice}",
@@ -333,9 +330,8 @@ def _found(record: IdentifiedRecord) -> _Finding:
             "constant has changed by the same factor"
         )
         return _Finding(f"the friction seems to have changed, {ratio}", advice)
-    if diagnosis.state in _ALARM_SENTENCES:
-        alarm = _ALARM_SENTENCES[diagnosis.state]
-        return _Finding(alarm.what.format(ratio=ratio), alarm.advice)
+    if (what := _STATE_WORDS.get(diagnosis.state)) is not None:
+        return _Finding(what.format(ratio=ratio), friction_advice(diagnosis.state.name))
     advice = _CHECK if _doubt(record) else "no action is needed"
     return _Finding(f"the friction is normal, {ratio}", advice)
 
@@ -344,7 +340,7 @@ def _sureness(friction: Parameter) -> str:
     """Return the limitation of the number, or an empty string if it is identified."""
     words = {
         Verdict.IDENTIFIED: "",
-        Verdict.WEAK: f", with the verdict weak ({friction.reason})",
+        Verdict.WEAK: f", but this value is weak ({friction.reason})",
         Verdict.FIXED: ", which was given and not identified",
     }
     return words[friction.verdict]

@@ -53,8 +53,13 @@ _TINY = float(np.finfo(float).tiny)
 WORK_LAGS: _Array = LAGS[::10]
 """Lags, s, at which the work is computed."""
 
-_CHANCE_OF_SPEED = 0.03
-"""Largest share of chance in the mean speed."""
+_SURE_MOVE, _OF_RANGE, _LARGEST_MOVE = 6.0, 5e-3, 0.25
+"""Least move that has a speed, in deviations of the noise of a move and as a share of the stem's
+range, and the largest share of the range that noise may demand."""
+
+_QUARTILE, _QUARTER_MAGNITUDE = 0.25, 0.3186
+"""Share of the pairs of moves that show noise alone, and the magnitude below which that share of
+normal noise of unit deviation lies. A stem that jumps in most samples leaves the others."""
 
 _WORK_NOISE = 5e-3
 _STROKE_NOISE, _STROKE = 6.0, 0.03
@@ -80,11 +85,9 @@ _STUCK = 5
 _COVERED = 0.7
 """Least share of the distance that remains after averaging; else the stem reverses within."""
 
-_SLOWER, _KEPT, _LASTS = 4, 0.95, 2e-3
+_SLOWER, _KEPT = 4, 0.95
 """Averages over this many averaging times separate lasting noise from motion, where they leave this
-share of the distance; and the share of it without work above which noise lasts.
-
-In eight drawn records without such noise it was 0.1 % at most, in four with it 0.3 to 3 %."""
+share of the distance."""
 
 
 def averaged_twice(signal: _Array, length: int) -> _Array:
@@ -159,6 +162,30 @@ class MeasuredSignal(NamedTuple):
         parts = [(self.time[part::2], self.value[part::2]) for part in (0, 1)]
         return [np.interp(grid, time, averaged_twice(value, length)) for time, value in parts]
 
+    def speed_over_distance(self, free: NDArray[np.bool_]) -> float:
+        """Return ∫|v|·|dx| where the stem is `free`, m²/s.
+
+        The speed of each move is measured over the shortest time in which the move surely exceeds
+        the noise: a jump from sample to sample, a slow ramp over many samples. Pieces of the record
+        without such a move are joined in pairs until they have one.
+        """
+        free = free[1:] & free[:-1]
+        raw, left, times = np.diff(self.value), np.diff(self.value) * free, np.diff(self.time)
+        range_, total = float(np.ptp(self.value)), 0.0
+        white = noise = math.sqrt(2.0) * self.noise
+        while raw.size > 1:
+            # The difference of adjacent moves has three times the variance of a move's noise, which
+            # grows with its time as in a random walk at most.
+            unsteady = float(np.quantile(np.abs(np.diff(raw)), _QUARTILE)) / _QUARTER_MAGNITUDE
+            noise = max(white, min(unsteady / math.sqrt(3.0), math.sqrt(2.0) * noise))
+            demanded = min(_SURE_MOVE * noise, _LARGEST_MOVE * range_)
+            sure = np.abs(left) >= max(demanded, _OF_RANGE * range_, _TINY)
+            total += float(np.sum((left[sure] ** 2 - white**2) / times[sure]))
+            left, times = np.where(sure, 0.0, left), np.where(sure, 0.0, times)
+            pairs = np.arange(0, raw.size, 2)
+            raw, left, times = (np.add.reduceat(one, pairs) for one in (raw, left, times))
+        return max(total, 0.0)
+
 
 def force_and_stem(record: StampedRecord, valve: Valve) -> tuple[MeasuredSignal, MeasuredSignal]:
     """Return the actuator force, N, and the stem, m, of a record."""
@@ -218,23 +245,14 @@ class Averages(NamedTuple):
         """Mean of both halves, m/s."""
         return 0.5 * (self.velocity[0] + self.velocity[1])
 
-    def distance_with_work(self, noise: float) -> tuple[_Path, float]:
-        """Return the path that the work confirms, and the mean speed over it where noise lasts.
-
-        That speed, m/s, is from averages so long that noise adds nothing to it; nan elsewhere, as
-        they may lose fast moves. `noise`, m, is the noise of the stem.
-        """
+    def distance_with_work(self, noise: float) -> _Path:
+        """Return the path that the work confirms; `noise`, m, is the noise of the stem."""
         length, free = _SLOWER * self.length, self.is_free
         calm = [averaged_twice(half[free], length) for half in self.position]
         slower = _path(calm, averaged_twice(self.force[0][free], length), noise)
         whole = max(self.path, self.finest)
-        if not slower.distance > _KEPT * self.finest.distance:
-            return whole.beside(self.path), math.nan
-        path = whole.beside(slower)
-        if not path.distance < (1.0 - _LASTS) * whole.distance:
-            return path, math.nan
-        squares = float(np.gradient(calm[0]) @ np.gradient(calm[1]))
-        return path, squares / (float(self.time[1] - self.time[0]) * slower.distance)
+        is_kept = slower.distance > _KEPT * self.finest.distance
+        return whole.beside(slower if is_kept else self.path)
 
 
 def averages_of(
@@ -390,7 +408,7 @@ class Work(NamedTuple):
     their noise is independent of that of the force, so it biases nothing. `noise`, N, combines the
     effect of chance on the work, half the effect of averaging over twice the time, and the
     uncertainty of the distance; `rounding`, N, is the effect of the force's converter. `speed` is
-    the mean speed over the distance, m/s, from the product of two halves of the samples.
+    the mean speed over the distance, m/s.
     """
 
     time: _Array
@@ -410,13 +428,13 @@ class Work(NamedTuple):
         time = np.arange(averages.time[0], averages.time[-1], step)
         after = np.minimum(np.searchsorted(averages.time, time), averages.time.size - 1)
         is_free = averages.is_free[after]
-        path, speed = averages.distance_with_work(stem.noise)
+        path = averages.distance_with_work(stem.noise)
         longest = averages.length * float(averages.time[1] - averages.time[0]) / step
         length = 2 * max(round(max(force.period, stem.period) / step), 1)
 
         whole = [np.interp(time, one.time, one.value) for one in (force, stem)]
-        if math.isnan(speed):
-            speed = _squares(stem, time, is_free, longest) / (step * path.distance)
+        sampled = np.minimum(np.searchsorted(averages.time, stem.time), averages.time.size - 1)
+        speed = stem.speed_over_distance(averages.is_free[sampled]) / path.distance
 
         def by(length: int) -> "Work":
             pressed, position = (averaged_twice(one, length) for one in whole)
@@ -467,27 +485,6 @@ def work_of_rounding(force: MeasuredSignal, time: _Array, along: _Array) -> floa
     weight = along * stuck[sample]
     shares = np.bincount(2 * level[sample] + (along > 0), weight)
     return step / math.sqrt(12.0) * float(np.linalg.norm(shares))
-
-
-def _squares(
-    stem: MeasuredSignal, time: _Array, is_free: NDArray[np.bool_], longest: float
-) -> float:
-    """Return the sum of the squares of all steps of a stem on a grid, m².
-
-    The squares are products of both halves, averaged as little as their noise allows. Without two
-    halves the noise would not cancel: the average is then over the `longest` number of samples.
-    """
-    step, halves = float(time[1] - time[0]), stem.halves(time)
-    length = max(int(longest), 1) if halves[0] is halves[1] else 1
-    while True:
-        even, odd = (np.gradient(averaged_twice(half, length)) for half in halves)
-        total = float(np.sum(even * odd * is_free))
-        samples = max(length, stem.period / step)
-        noise = stem.noise * math.sqrt(2.0 * stem.period / step / samples) / samples
-        chance = math.sqrt(float(np.count_nonzero(is_free)) * samples) * noise**2
-        if chance <= _CHANCE_OF_SPEED * total or 2 * length > longest:
-            return max(total, 0.0)
-        length *= 2
 
 
 def away_from_stops(position: _Array, valve: Valve) -> NDArray[np.bool_]:

@@ -77,6 +77,11 @@ class AlarmBoard:
 
     The alarms are those of the history; without one, or while it cannot be written, those of this
     run.
+
+    Attributes
+    ----------
+    is_requested : bool
+        Whether somebody asked for the next identification: its 95 % interval then decides.
     """
 
     def __init__(
@@ -89,8 +94,10 @@ class AlarmBoard:
         self._node, self._monitor, self._history = node, monitor, history
         self._evidence = evidence
         self._alarms: dict[AlarmKind, Alarm] = history.alarms()
+        moves = evidence.evidence
         self._hold = FrictionHold(
-            {side: self._condition(kind) for side, kind in ALARM_OF_SIDE.items()}
+            {side: self._condition(kind) for side, kind in ALARM_OF_SIDE.items()},
+            moves.until if moves.moves else None,
         )
         self._delays = {
             AlarmKind.STUCK: Delay(0.0, _FALL, self._condition(AlarmKind.STUCK)),
@@ -98,6 +105,7 @@ class AlarmBoard:
             AlarmKind.POSITIONER: Delay(0.0, _SETTLE, self._condition(AlarmKind.POSITIONER)),
         }
         self._identified: int | None = None
+        self.is_requested = False
         self._under_way: _Step | None = None
         if not node.tells_parameters:
             return  # who asks is a parameter
@@ -188,14 +196,18 @@ class AlarmBoard:
             self._identified = None
         stamp, until = monitor.stamp, monitor.seen_until
         if stamp is not None and until is not None and stamp not in (self._identified, 0):
-            elapsed = None if self._identified is None else stamp - self._identified
-            self._identified = stamp
+            elapsed = None
+            if self._identified is not None and not self.is_requested:
+                elapsed = stamp - self._identified
+            self._identified, self.is_requested = stamp, False
             if stamp > renewal:
                 self._hold = self._hold.looked(monitor.diagnosis(), until, limits, elapsed)
-        if evidence.moves and evidence.until != self._hold.until:
+        before_moves = self._hold.until
+        if evidence.moves and (before_moves is None or evidence.until > before_moves):
             found = self._evidence.diagnosis
             if found is not None:
-                self._hold = self._hold.looked(found, evidence.until, limits)
+                elapsed = None if before_moves is None else evidence.until - before_moves
+                self._hold = self._hold.looked(found, evidence.until, limits, elapsed)
         return {kind: self._hold.conditions[side] for side, kind in ALARM_OF_SIDE.items()}
 
     def _whole_valve(self, findings: Sequence[Finding]) -> Condition:

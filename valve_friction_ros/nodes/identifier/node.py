@@ -359,13 +359,15 @@ class Identifier(ManagedNode):
         """Identify the buffer, and keep the result or the refusal; return the diagnosis."""
         self._inputs.take(is_all=True)
         record, refused = self._identification.record(), None
+        self._board.is_requested = True
         try:
             await self._identification.run(record)
         except RefusalError as refusal:
-            refused = refusal
+            refused, self._board.is_requested = refusal, False
             self._monitor.refuse(refusal)
             self.get_logger().warning(f"identification refused: {refusal}")
         except InternalError:
+            self._board.is_requested = False
             self._publish_diagnostics()
             raise
         answer = "; ".join(
