@@ -691,7 +691,7 @@ _SENTENCES = {
     "more than {ratio:.2g} times the friction of the baseline, by a part in the "
     "trim or by a lock, or the position sensor has failed; {advice}",
     Code.HELD_IN_TEST: "the stem stayed at {position:in .1f mm} mm in a test although the force "
-    "should have moved it: static friction is at least {friction:.3g} N, "
+    "should have moved it: static friction is at least {friction:.0f} N, "
     "{ratio:.2f} times the friction of the baseline, or the stem is blocked; "
     "{advice}",
     Code.BUFFER_CLEARED: "{because}: the buffer was cleared",

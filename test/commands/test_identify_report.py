@@ -140,6 +140,21 @@ def test_the_page_of_the_default_method(reported, write_csv, columns_of, quick_r
     assert "0 samples" not in words.replace("1000 samples", "")
 
 
+def test_a_test_that_did_not_move_the_stem_shows_what_held_it(
+    call, write_csv, columns_of, quick_record, bench_yaml
+):
+    pressure, position = np.tile(quick_record.pressure, 2), quick_record.position
+    held = np.full(pressure.size, 0.5 * (position.min() + position.max()))
+    seized = write_csv(columns_of(Recording(0.01, pressure, held)))
+    seized = seized.rename(seized.with_name("seized.csv"))
+    healthy = write_csv(columns_of(quick_record))
+    options = ("--valve", bench_yaml, "--method", "bench", "--fail-on", "error")
+    code, out, err = call(seized, *options, "--baseline-recording", healthy)
+    assert (code, out) == (3, "")
+    assert "the stem did not move: " in err
+    assert "; ERROR: the stem stayed at " in err
+
+
 @pytest.mark.parametrize(
     ("healthy", "status"),
     [

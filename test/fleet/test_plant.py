@@ -38,7 +38,7 @@ from valve_friction_ros.dashboard.history_cache import KeptValves
 from valve_friction_ros.dashboard.plant_rows import state_of, state_words
 from valve_friction_ros.fleet.job import kept_valve
 from valve_friction_ros.fleet.plant import read_plant, tags_in
-from valve_friction_ros.history import AlarmFilter, HistoryFile
+from valve_friction_ros.history import AlarmFilter, HistoryFile, read_alarms
 from valve_friction_ros.model import BENCH_VALVE, LOW_FRICTION, SensorNoise, SineWave, simulate
 from valve_friction_ros.model.recording import Recording
 
@@ -467,3 +467,54 @@ class TestTable:
 )
 def test_tags(text, found):
     assert tags_in([text], ["FV-101", "FV-101A", "FV-10"]) == found
+
+
+class TestSeizedStem:
+    """Two quarters of one valve: it moves, then the same pressure swings and the stem stays."""
+
+    @pytest.fixture(scope="class")
+    def answers(self, tmp_path_factory):
+        """The folder, the exit code, and what was printed."""
+        folder = tmp_path_factory.mktemp("seized")
+        (folder / "valves.csv").write_text(TABLE)
+        pressure, position = stroke(150.0, 1)
+        held = np.full_like(position, 0.5 * (position.min() + position.max()))
+        held += np.random.default_rng(2).normal(0.0, 2e-6, held.size)
+        exports = folder / "exports"
+        exports.mkdir()
+        for number, stem in ((0, position), (1, held)):
+            name, begin = f"FV-101 {number}.csv", QUARTERS[number]
+            (exports / name).write_text(german(begin, pressure, stem))
+        arguments = [
+            "identify-folder", str(exports), "--plant", str(folder / "valves.csv"),
+            "--history", str(folder / "history.sqlite"), "--first-is-baseline", "--jobs", "1",
+            "--output", str(folder / "friction.csv"), "--output", str(folder / "friction.html"),
+            "--no-reports", "--time-zone", "Europe/Berlin", "--fail-on", "error",
+        ]  # fmt: skip
+        out = io.StringIO()
+        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(io.StringIO()):
+            codes = [run(arguments), run(arguments)]
+        return folder, codes, out.getvalue()
+
+    def test_it_is_an_error_with_its_advice(self, answers):
+        folder, codes, out = answers
+        assert codes == [3, 3]
+        assert " ERROR FV-101 1.csv FV-101: the stem stayed at " in out
+        assert "\n       inspect the stem and repeat the test with more force\n" in out
+        with (folder / "friction.csv").open() as stream:
+            moved, seized = csv.DictReader(stream)
+        assert (moved["level"], moved["error"]) == ("OK", "")
+        assert (seized["level"], seized["ne_107"]) == ("ERROR", "F")
+        assert seized["error"].startswith("the stem did not move: ")
+        assert ">stuck<" in (folder / "friction.html").read_text()
+
+    def test_it_is_filed_once_with_its_alarm(self, answers):
+        folder, *_ = answers
+        moved, seized = entries(folder, "FV-101")
+        assert (moved.refusal, bool(seized.refusal)) == ("", True)
+        assert seized.diagnosis.level.name == "ERROR"
+        file = HistoryFile(folder / "history.sqlite")
+        (alarm,) = read_alarms(file, kept_valve("FV-101").name).values()
+        assert (alarm.kind.value, alarm.condition.level.name) == ("stuck", "ERROR")
+        assert alarm.state.value == "unacknowledged"
+        assert alarm.raised == seized.span.end

@@ -41,14 +41,14 @@ from valve_friction_ros.health import (
     Survey,
     diagnose_valve,
 )
+from valve_friction_ros.health.friction_monitor import MonitorSettings, identify_recording
+from valve_friction_ros.health.standstill import held_diagnosis
+from valve_friction_ros.health.valve_numbers import RefusedRecordError
 from valve_friction_ros.identification import (
-    IdentificationSettings,
-    Method,
     RefusalError,
     Result,
-    method_named,
 )
-from valve_friction_ros.model import Recording, Valve
+from valve_friction_ros.model import Recording
 from valve_friction_ros.outside_text import printable
 from valve_friction_ros.records.recorded_valve import RecordedValve, Stretch
 from valve_friction_ros.records.recordings import ReadingOptions, read_recordings
@@ -142,36 +142,35 @@ class _Answer(NamedTuple):
 
 
 def _identified(
-    recorded: RecordedValve,
-    valve: Valve,
-    identify: Method,
-    settings: IdentificationSettings,
-) -> Result | RefusalError:
-    """Identify one valve, or return why not, with its name."""
+    recorded: RecordedValve, settings: MonitorSettings, baseline: Baseline | None = None
+) -> _Answer:
+    """Identify one valve, or return why not, with its name.
+
+    A test that did not move the stem shows what held it, if there is a baseline.
+    """
     try:
         recording = recorded.recording()
     except RefusalError as refusal:
-        return refusal
+        return _Answer(recorded, refusal)
     try:
-        return identify(recording, valve, settings)
-    except RefusalError as refusal:
-        return recorded.refused(refusal)
+        result = identify_recording(recording, settings)
+    except RefusedRecordError as refusal:
+        held = held_diagnosis(refusal.numbers, baseline, settings.valve, settings.limits)
+        shown = refusal if held is None else RefusalError(f"{refusal}; {held}")
+        return _Answer(recorded, recorded.refused(shown), held)
+    return _Answer(recorded, result, *diagnose_valve(result, baseline, settings.limits))
 
 
 def _of_healthy(
-    options: argparse.Namespace,
-    valve: Valve,
-    identify: Method,
-    settings: IdentificationSettings,
-    reading: ReadingOptions,
+    options: argparse.Namespace, settings: MonitorSettings, reading: ReadingOptions
 ) -> tuple[Baseline, Recording]:
     """Return the frictions of the healthy valve, and its record.
 
     Raises RefusalError, which names its file, where it cannot be a baseline.
     """
     whole = replace(reading, stretch=Stretch(), beside=())
-    recorded = read_one(options.baseline_recording, valve, whole)
-    outcome = _identified(recorded, valve, identify, settings)
+    recorded = read_one(options.baseline_recording, settings.valve, whole)
+    outcome = _identified(recorded, settings).outcome
     if isinstance(outcome, RefusalError):
         raise outcome
     try:
@@ -252,15 +251,18 @@ def run(options: argparse.Namespace) -> int:
     """Identify the valves of the file, print what was found, and write the files asked for."""
     description, reading = described(options.file, options.valve, options)
     valve = description.valve
-    settings = identification_settings(options, description)
-    limits = survey_limits(options, description)
-    method = method_named(method_name(options, description.settings))
+    settings = MonitorSettings(
+        valve,
+        identification_settings(options, description),
+        method_name(options, description.settings),
+        survey_limits(options, description),
+    )
     baseline = baseline_from(options)
     require_outputs(picture=options.plot)
     _require_report(options)
     healthy: Recording | None = None
     if options.baseline_recording is not None:
-        baseline, healthy = _of_healthy(options, valve, method, settings, reading)
+        baseline, healthy = _of_healthy(options, settings, reading)
     with reading_progress():
         recorded = read_recordings(options.file, valve, reading)
     save_columns(options, reading)
@@ -274,22 +276,19 @@ def run(options: argparse.Namespace) -> int:
             require_one(recorded, purpose)
     results = []
     for each in recorded:
-        outcome = _identified(each, valve, method, settings)
-        diagnosis: Diagnosis | None = None
-        findings: tuple[Finding, ...] = ()
-        if isinstance(outcome, Result):
-            diagnosis, findings = diagnose_valve(outcome, baseline, limits)
-            tells = baseline is not None or diagnosis.survey is not Survey.UNKNOWN
-            if not tells and options.fail_on is None:
-                diagnosis = None
-        results.append(_Answer(each, outcome, diagnosis, findings))
+        answer = _identified(each, settings, baseline)
+        own = answer.diagnosis
+        tells = baseline is not None or (own is not None and own.survey is not Survey.UNKNOWN)
+        if not tells and options.fail_on is None:
+            answer = answer._replace(diagnosis=None)
+        results.append(answer)
     try:
         code = _print(results, options.command, options.json)
     finally:  # a closed output costs no picture, and a full disk no numbers
         for each, outcome, _, _ in results:
             if isinstance(outcome, Result):
                 zone = reading.columns.time_zone
-                _write_files(options, each, outcome, baseline, healthy, limits, zone)
+                _write_files(options, each, outcome, baseline, healthy, settings.limits, zone)
     if options.fail_on is not None and baseline is None:
         complain(
             options.command,

@@ -40,8 +40,14 @@ from valve_friction_ros.health import (
     diagnose_valve,
 )
 from valve_friction_ros.health.alarm_conditions import ALARM_OF_SIDE, shown_by
-from valve_friction_ros.health.friction_monitor import MonitorSettings
-from valve_friction_ros.health.valve_numbers import valve_numbers
+from valve_friction_ros.health.alarms import NO_CONDITION, Condition
+from valve_friction_ros.health.diagnosis import FrictionState
+from valve_friction_ros.health.friction_monitor import MonitorSettings, identify_recording
+from valve_friction_ros.health.levels import Level
+from valve_friction_ros.health.measured import Measured
+from valve_friction_ros.health.standstill import HELD_FRICTION, held_diagnosis
+from valve_friction_ros.health.valve_diagnosis import ValveDiagnosis
+from valve_friction_ros.health.valve_numbers import RefusedRecordError, valve_numbers
 from valve_friction_ros.history import (
     HistoryEntry,
     HistoryFile,
@@ -50,19 +56,15 @@ from valve_friction_ros.history import (
     follow_alarms,
     read_alarms,
 )
-from valve_friction_ros.history.entry import Fit, Span, settings_text
-from valve_friction_ros.identification import (
-    IdentificationSettings,
-    RefusalError,
-    Result,
-    method_named,
-)
-from valve_friction_ros.model import Valve
+from valve_friction_ros.history.entry import Span, kept_of, settings_text
+from valve_friction_ros.identification import IdentificationSettings, RefusalError, Result
+from valve_friction_ros.model import Recording, Valve
 from valve_friction_ros.records.files import on_disk
 from valve_friction_ros.records.recorded_valve import RecordedValve
 from valve_friction_ros.records.recordings import ReadingOptions, read_recordings
 from valve_friction_ros.streams import utc
 from valve_friction_ros.streams.samples import nanoseconds
+from valve_friction_ros.wording import Code, said
 
 FILING = "filing"
 """What a row holds beside its columns until it is filed."""
@@ -81,35 +83,61 @@ class Filing:
     ----------
     recording, tag : str
         The recording, and the tag of its valve.
-    result : Result
-        The result, without its pictures; its record is thinned.
-    method : str
-        Name of the method.
-    limits : FrictionLimits
-        Limits of its diagnosis.
+    span : Span
+        First and last time of the record, ns.
+    settings : MonitorSettings
+        How it was identified, and the limits of its diagnosis.
+    outcome : Result or RefusedRecordError
+        The result, without its pictures; or the refusal of a test in which the stem did not move.
     """
 
     recording: str
     tag: str
-    result: Result
-    method: str
-    limits: FrictionLimits
+    span: Span
+    settings: MonitorSettings
+    outcome: Result | RefusedRecordError
 
     @classmethod
-    def of(cls, recording: str, options: "Options", result: Result) -> "Filing | None":
-        """Return what is filed of a result; None where its record has no date."""
-        if not options.tag or result.recording.start_time < DATED:
+    def of(
+        cls,
+        name: str,
+        tag: str,
+        settings: MonitorSettings,
+        recording: Recording,
+        outcome: Result | RefusedRecordError,
+    ) -> "Filing | None":
+        """Return what is filed of a recording.
+
+        None where it has no date, or a refusal shows nothing of the friction.
+        """
+        if not tag or recording.start_time < DATED:
             return None
-        light = copy.copy(result)
-        object.__setattr__(light, "stem", None)
-        object.__setattr__(light, "exhibit", None)
-        return cls(recording, options.tag, light, options.method, options.limits)
+        if isinstance(outcome, RefusedRecordError):
+            if HELD_FRICTION not in outcome.numbers:
+                return None
+        else:
+            outcome = copy.copy(outcome)
+            object.__setattr__(outcome, "stem", None)
+            object.__setattr__(outcome, "exhibit", None)
+        begin = nanoseconds(recording.start_time)
+        span = Span(begin, begin + nanoseconds(recording.duration))
+        return cls(name, tag, span, settings, outcome)
 
     @property
-    def span(self) -> Span:
-        """First and last time of the record, ns."""
-        begin = nanoseconds(self.result.recording.start_time)
-        return Span(begin, begin + nanoseconds(self.result.recording.duration))
+    def numbers(self) -> Mapping[str, Measured]:
+        """What the recording shows of the valve beside the parameters."""
+        if isinstance(self.outcome, RefusedRecordError):
+            return self.outcome.numbers
+        return valve_numbers(self.outcome)
+
+    def diagnosed(self, baseline: Baseline | None) -> ValveDiagnosis:
+        """Compare the outcome with a baseline."""
+        limits = self.settings.limits
+        if not isinstance(self.outcome, RefusedRecordError):
+            return diagnose_valve(self.outcome, baseline, limits)
+        held = held_diagnosis(self.outcome.numbers, baseline, self.settings.valve, limits)
+        unknown = said(Code.NO_ESTIMATE, reason=str(self.outcome))
+        return ValveDiagnosis(held or Diagnosis.of(FrictionState.UNKNOWN, unknown), ())
 
 
 @dataclass(frozen=True)
@@ -168,9 +196,16 @@ class _Alarms:
         time = filing.span.end
         if self._hold.until is not None and time <= self._hold.until:
             return
-        self._hold = replace(self._hold.looked(diagnosis, time, filing.limits), until=time)
-        conditions = {kind: self._hold.conditions[side] for side, kind in ALARM_OF_SIDE.items()}
-        conditions[AlarmKind.WHOLE_VALVE] = shown_by(findings)
+        if isinstance(filing.outcome, RefusedRecordError):
+            self._hold = replace(self._hold, until=time)
+            held = Condition(diagnosis.level, diagnosis.status_signal, diagnosis.message)
+            conditions = {} if diagnosis.level is Level.OK else {AlarmKind.STUCK: held}
+        else:
+            looked = self._hold.looked(diagnosis, time, filing.settings.limits)
+            self._hold = replace(looked, until=time)
+            conditions = {kind: self._hold.conditions[side] for side, kind in ALARM_OF_SIDE.items()}
+            conditions[AlarmKind.WHOLE_VALVE] = shown_by(findings)
+            conditions[AlarmKind.STUCK] = NO_CONDITION
         follow_alarms(self._history, self._valve, conditions, time)
 
 
@@ -221,37 +256,22 @@ def file_results(place: Path, filings: Iterable[Filing], first_is_baseline: bool
             in_force[one.tag] = _begin(history, valve, one)
             begun += [one.tag] if in_force[one.tag] is not None else []
         baseline = in_force[one.tag]
-        diagnosis, findings = diagnose_valve(one.result, baseline, one.limits)
+        diagnosis, findings = one.diagnosed(baseline)
         cells[one.recording, one.tag] = diagnosis_cells(diagnosis, findings)
         if (one.tag, one.span.begin // 10**9) in before:
             known += 1
             continue
-        result = one.result
-        settings = MonitorSettings(
-            result.valve,
-            result.settings,
-            one.method,
-            window=max(result.recording.duration, result.recording.sample_period),
-        )
         history.add(
             HistoryEntry(
                 time=one.span.end,
                 valve=valve,
                 span=one.span,
-                method=result.method,
+                method=one.settings.method,
                 diagnosis=diagnosis,
-                limits=one.limits,
+                limits=one.settings.limits,
                 baseline=baseline,
-                settings=settings_text(settings),
-                parameters=result.parameters,
-                fit=Fit(
-                    result.fit,
-                    result.rms,
-                    float("nan") if result.misfit is None else result.misfit.of_stem,
-                ),
-                warnings=result.warnings,
-                sliding_speed=result.sliding_speed,
-                numbers=valve_numbers(result),
+                settings=settings_text(one.settings),
+                **kept_of(one.outcome, one.numbers),
             )
         )
         alarms[one.tag].follow(diagnosis, findings, one)
@@ -260,11 +280,13 @@ def file_results(place: Path, filings: Iterable[Filing], first_is_baseline: bool
 
 def _begin(history: HistoryFile, valve: KeptValve, one: Filing) -> Baseline | None:
     """Make the first result of a valve its baseline; None where it cannot be one."""
+    if isinstance(one.outcome, RefusedRecordError):
+        return None
     try:
-        baseline = Baseline.of(one.result)
+        baseline = Baseline.of(one.outcome)
     except RefusalError:
         return None
-    record = KeptBaseline.thin(one.result.recording)
+    record = KeptBaseline.thin(one.outcome.recording)
     kept = KeptBaseline(baseline, one.span.end, one.span.end, record, by="identify-folder")
     history.set_baseline(valve, kept)
     return baseline
@@ -357,18 +379,33 @@ def _dated(job: Job, result: Result) -> str:
 def _cells(job: Job, recorded: RecordedValve) -> Mapping[str, Cell]:
     options = job.options
     name = options.tag or recorded.name
+    baseline = options.baselines.get(name) or job.baseline
+    cells: dict[str, Any]
+    outcome: Result | RefusedRecordError
     try:
         recording = recorded.recording()
-        identify = method_named(options.method)
-        result = identify(recording, options.valve, options.settings)
+        settings = MonitorSettings(
+            options.valve,
+            options.settings,
+            options.method,
+            options.limits,
+            window=max(recording.duration, recording.sample_period),
+        )
+        outcome = result = identify_recording(recording, settings)
+    except RefusedRecordError as refusal:
+        cells = {**error_cells(name, str(refusal), job.path)}
+        held = held_diagnosis(refusal.numbers, baseline, options.valve, options.limits)
+        cells |= {} if held is None else diagnosis_cells(held)
+        outcome = refusal
     except RefusalError as refusal:
         return error_cells(name, str(refusal), job.path)
-    baseline = options.baselines.get(name) or job.baseline
-    diagnosis, found = diagnose_valve(result, baseline, options.limits)
-    cells: dict[str, Any] = result_cells(name, result, diagnosis, recorded.notes, found)
+    else:
+        diagnosis, found = diagnose_valve(result, baseline, options.limits)
+        cells = dict(result_cells(name, result, diagnosis, recorded.notes, found))
+        cells |= _report(job, recorded, result, baseline)
     if job.is_filed:
-        cells[FILING] = Filing.of(job.name, options, result)
-    return {**cells, **_report(job, recorded, result, baseline)}
+        cells[FILING] = Filing.of(job.name, options.tag, settings, recording, outcome)
+    return cells
 
 
 def identify_job(job: Job) -> list[Mapping[str, Cell]]:

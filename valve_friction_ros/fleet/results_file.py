@@ -281,7 +281,7 @@ def _line(row: _Row, zone: str) -> dict[str, Any]:
         "sliding": _with_width(row, "sliding_friction"),
         "coulomb": _with_width(row, "coulomb_friction"),
         "to_do": text("what_to_do"),
-        "finding": text("error") or "; ".join(filter(None, map(text, ("message", "findings")))),
+        "finding": "; ".join(filter(None, map(text, ("message", "findings", "error")))),
         "report": quote(text("report")),
     }
 

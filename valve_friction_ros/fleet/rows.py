@@ -185,8 +185,9 @@ def _number(row: Mapping[str, Cell], name: str) -> float:
 def status_of(row: Mapping[str, Cell]) -> RowStatus:
     """Say how a valve is: a word, and ``error``, ``warn``, ``maybe``, ``ok`` or ``none``."""
     level, ratio = _level(row), _number(row, "ratio")
-    if level is None:
-        return RowStatus("refused", "none")
+    if level is None or row.get("error"):
+        known = "" if level is None else level.name.lower()
+        return RowStatus("stuck", known) if known else RowStatus("refused", "none")
     if level > (_friction_level(row) or Level.OK):
         return RowStatus("changed", level.name.lower())
     if level is Level.OK or row["ne_107"] == StatusSignal.CHECK_FUNCTION.value:

@@ -45,6 +45,7 @@ from valve_friction_ros.identification import (
 )
 from valve_friction_ros.identification.refusal import LittleMotionError
 from valve_friction_ros.model.checks import require_positive
+from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.streams.record_buffer import RecordBuffer, Snapshot
 from valve_friction_ros.wording import Code, Statement, said
@@ -186,24 +187,32 @@ def identify_snapshot(snapshot: Snapshot, settings: MonitorSettings) -> Result:
 
     Raises RefusedRecordError with the cause, and with the cause of a recent clearing of the buffer.
     """
-    valve, how = settings.valve, settings.identification
-    numbers: dict[str, Measured] = {}
     thin, count = snapshot.thinned(MOST_SAMPLES)
     try:
-        recording = thin.recording()
-        try:
-            result = method_named(settings.method)(recording, valve, how)
-            return result if count == 1 else _of_means(result, count)
-        except RefusalError as refusal:
-            numbers = numbers_of_refused(recording, valve, how)
-            if isinstance(refusal, LittleMotionError):
-                numbers |= held_numbers(recording, valve)
-            raise
+        result = identify_recording(thin.recording(), settings)
     except RefusalError as refusal:
         cleared = snapshot.cleared_because
         why = "" if cleared is None else f" (the buffer was cleared: {cleared})"
-        is_fault = not isinstance(refusal, LittleMotionError)
-        raise RefusedRecordError(f"{refusal}{why}", numbers, is_fault) from refusal
+        if not isinstance(refusal, RefusedRecordError):
+            refusal = RefusedRecordError.of(refusal, {})
+        raise RefusedRecordError(f"{refusal}{why}", refusal.numbers, refusal.is_fault) from refusal
+    return result if count == 1 else _of_means(result, count)
+
+
+def identify_recording(recording: Recording, settings: MonitorSettings) -> Result:
+    """Identify a recording by the method and settings of its valve.
+
+    Raises RefusedRecordError with what the record shows nevertheless. Of a stem that did not move,
+    that is the friction which held it (`held_numbers`).
+    """
+    valve, how = settings.valve, settings.identification
+    try:
+        return method_named(settings.method)(recording, valve, how)
+    except RefusalError as refusal:
+        numbers = numbers_of_refused(recording, valve, how)
+        if isinstance(refusal, LittleMotionError):
+            numbers |= held_numbers(recording, valve)
+        raise RefusedRecordError.of(refusal, numbers) from refusal
 
 
 def _of_means(result: Result, count: int) -> Result:

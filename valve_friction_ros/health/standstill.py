@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from valve_friction_ros.health.baseline import Baseline
-from valve_friction_ros.health.diagnosis import FrictionLimits
+from valve_friction_ros.health.diagnosis import Diagnosis, FrictionLimits
 from valve_friction_ros.health.levels import Finding, Level, StatusSignal
 from valve_friction_ros.health.measured import Measured
 from valve_friction_ros.model.recording import Recording
@@ -34,6 +34,9 @@ _BLOCK = 10_000_000_000
 
 _BLOCK_OF_TEST = 2_000_000_000
 """Averaging time in a test, ns. Chosen: several times the lag of any sensor and actuator."""
+
+HELD_FRICTION = "held_friction"
+"""Name of the largest static friction that a standstill demands."""
 
 _STOP = 0.03
 """Share of the travel from an end within which a stem may rest on its stop. Chosen."""
@@ -199,7 +202,7 @@ def held_numbers(recording: Recording, valve: Valve) -> dict[str, Measured]:
     most = max(found, key=lambda one: one.least_friction(valve))
     middle = 0.5 * (most.lowest_pressure + most.highest_pressure)
     return {
-        "held_friction": Measured(most.least_friction(valve), 0.0),
+        HELD_FRICTION: Measured(most.least_friction(valve), 0.0),
         "held_force": Measured(valve.actuator_force(middle), 0.0),
         "held_position": Measured(most.position, _STILL * valve.travel),
     }
@@ -213,7 +216,7 @@ def held_finding(
     Return None without them, and where a stop may have held the stem.
     """
     swing, middle, place = (
-        numbers.get(name) for name in ("held_friction", "held_force", "held_position")
+        numbers.get(name) for name in (HELD_FRICTION, "held_force", "held_position")
     )
     if swing is None or place is None:
         return None
@@ -229,6 +232,15 @@ def held_finding(
         leads=True,
         friction_ratio=ratio,
     )
+
+
+def held_diagnosis(
+    numbers: Mapping[str, Measured], baseline: Baseline | None, valve: Valve, limits: FrictionLimits
+) -> Diagnosis | None:
+    """Return the diagnosis of a refused record by `held_finding`, or None without one."""
+    if baseline is None or (held := held_finding(numbers, baseline, valve, limits)) is None:
+        return None
+    return Diagnosis(held.level, held.status_signal, held.statement, None)
 
 
 def _surely_held(

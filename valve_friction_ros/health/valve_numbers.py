@@ -29,6 +29,7 @@ from valve_friction_ros.identification import (
     Result,
     Verdict,
 )
+from valve_friction_ros.identification.refusal import LittleMotionError
 from valve_friction_ros.identification.trust.excitation import (
     require_drive,
     require_motion,
@@ -396,6 +397,11 @@ class RefusedRecordError(RefusalError):
     ) -> None:
         super().__init__(message)
         self.numbers, self.is_fault = numbers, is_fault
+
+    @classmethod
+    def of(cls, refusal: RefusalError, numbers: Mapping[str, Measured]) -> "RefusedRecordError":
+        """Return a refusal with numbers; too little motion is no fault of the record."""
+        return cls(str(refusal), numbers, not isinstance(refusal, LittleMotionError))
 
     def __reduce__(self) -> tuple[object, ...]:
         """Support pickling with all arguments."""

@@ -29,6 +29,7 @@ from valve_friction_ros.identification import (
     SLIDING,
     Parameter,
     RefusalError,
+    Result,
     Verdict,
     parameter_mapping,
     plain,
@@ -358,23 +359,7 @@ def entry_of(
     refusal : RefusalError, optional
         Why the record was refused; without one the monitor holds its result.
     """
-    result, outcome = monitor.result, dict[str, Any]()
-    if refusal is not None:
-        outcome = {"refusal": str(refusal)}
-        if isinstance(refusal, RefusedRecordError):
-            outcome["numbers"] = refusal.numbers
-    elif result is not None:
-        outcome = {
-            "parameters": result.parameters,
-            "fit": Fit(
-                result.fit,
-                result.rms,
-                math.nan if result.misfit is None else result.misfit.of_stem,
-            ),
-            "warnings": result.warnings,
-            "sliding_speed": result.sliding_speed,
-            "numbers": monitor.known.of_latest,
-        }
+    outcome = refusal or monitor.result
     return HistoryEntry(
         time=time,
         valve=valve,
@@ -384,5 +369,21 @@ def entry_of(
         limits=monitor.settings.limits,
         baseline=monitor.baseline,
         settings=settings_text(settings),
-        **outcome,
+        **({} if outcome is None else kept_of(outcome, monitor.known.of_latest)),
     )
+
+
+def kept_of(outcome: Result | RefusalError, numbers: Mapping[str, Measured]) -> dict[str, Any]:
+    """Return the fields of an entry that hold a result, with its `numbers`, or a refusal."""
+    if isinstance(outcome, RefusedRecordError):
+        return {"refusal": str(outcome), "numbers": outcome.numbers}
+    if isinstance(outcome, RefusalError):
+        return {"refusal": str(outcome)}
+    of_stem = math.nan if outcome.misfit is None else outcome.misfit.of_stem
+    return {
+        "parameters": outcome.parameters,
+        "fit": Fit(outcome.fit, outcome.rms, of_stem),
+        "warnings": outcome.warnings,
+        "sliding_speed": outcome.sliding_speed,
+        "numbers": numbers,
+    }

@@ -251,7 +251,7 @@ def what_to_do(diagnosis: Diagnosis, findings: Sequence[Finding] = ()) -> str:
 
     Without a comparison it is that of the first survey, by absolute limits.
     """
-    advice = friction_advice(diagnosis.state.name)
+    advice = friction_advice(diagnosis.state.name) or finding_advice(diagnosis.statement)
     if not advice and findings:
         advice = finding_advice(by_severity(findings)[0].statement)
     if advice:
