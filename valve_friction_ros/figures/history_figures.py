@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Figures over the time: the friction of valves with its trend, and their usage."""
+"""Figures over time: friction with its trend, and usage, per valve."""
 
 import textwrap
 from collections.abc import Sequence
@@ -40,13 +40,13 @@ _REFUSAL_HEIGHT = 0.03
 """Height of the marks of refusals, as a share of the panel."""
 
 _SHORTEST = 7_200_000_000_000
-"""Shortest time axis, ns; around a single point matplotlib would show years."""
+"""Shortest time axis, ns; matplotlib would show years around a single point."""
 
 _PLACES = 150
-"""Points with an interval that have room side by side on a time axis."""
+"""Points with an interval that fit side by side on a time axis."""
 
 _TITLE_WIDTH = 110
-"""Characters of one line above a panel."""
+"""Characters per line of a panel title."""
 
 
 def _dates(times: ArrayLike) -> NDArray[np.datetime64]:
@@ -55,15 +55,15 @@ def _dates(times: ArrayLike) -> NDArray[np.datetime64]:
 
 
 def _end(history: ValveHistory) -> int:
-    """Return the time up to which a valve is drawn, ns."""
+    """Return the end of the curves of a valve, ns."""
     last, trend = history.entries[-1].time, history.trend
     return last if trend is None else max(last, end_of_trend(trend))
 
 
 def span_of_time(histories: Sequence[ValveHistory], now: int | None) -> tuple[int, int]:
-    """Return the ends of a time axis for some histories, ns.
+    """Return the ends of a time axis for several histories, ns.
 
-    Today is within it, unless that would leave them less than a third of it.
+    The axis includes today, unless that would squeeze the histories into less than a third of it.
     """
     begin = min(history.entries[0].time for history in histories)
     end = max(map(_end, histories))
@@ -76,7 +76,7 @@ def span_of_time(histories: Sequence[ValveHistory], now: int | None) -> tuple[in
 def draw_history(
     axes: Axes, history: ValveHistory, span: tuple[int, int], now: int | None = None
 ) -> None:
-    """Draw a history on a time axis of this span, ns, and today, where it lies within."""
+    """Draw a history on a time axis of this span, ns, and mark today if it lies within."""
     _draw_limits(axes, history, span)
     _draw_estimates(axes, history, span)
     _draw_refusals(axes, history)
@@ -95,7 +95,7 @@ def _mark(axes: Axes, time: int, style: str, label: str) -> None:
 
 
 def entitle(axes: Axes, history: ValveHistory) -> None:
-    """Write valve and drift above a panel; a tag is text from outside, and may be long."""
+    """Write valve and drift above a panel; a tag comes from outside and may be long."""
     tag, name = history.valve.tag, history.valve.name
     title = f"{tag} ({name})" if tag else name
     drift = ""
@@ -119,7 +119,7 @@ def _tick_dates(axes: Axes, most: int, least: int = 5) -> None:
 def set_dates(
     axes: Axes, span: tuple[int, int], histories: Sequence[ValveHistory], most_ticks: int = 9
 ) -> None:
-    """Label the time axis of some histories, with their first and last day."""
+    """Label the time axis of several histories with their first and last day."""
     axes.set_xlim(*_dates(span))
     _tick_dates(axes, most_ticks)
     times = [entry.time for history in histories for entry in history.entries]
@@ -128,7 +128,7 @@ def set_dates(
 
 
 def _draw_limits(axes: Axes, history: ValveHistory, span: tuple[int, int]) -> None:
-    """Draw baseline and limits as they were in force at each identification, over the axis."""
+    """Draw the baseline and limits in force at each identification, across the axis."""
     times = [entry.time for entry in history.entries]
     of = trended(history.entries[-1].baseline)
     levels = np.array(
@@ -165,7 +165,7 @@ def _what(history: ValveHistory) -> str:
 
 
 def _draw_estimates(axes: Axes, history: ValveHistory, span: tuple[int, int]) -> None:
-    """Draw every friction as a dot, and those that have room with their intervals."""
+    """Draw every friction as a dot, and add intervals where there is room."""
     baseline = history.entries[-1].baseline
     of = trended(baseline)
     points = {
@@ -200,7 +200,7 @@ def _draw_estimates(axes: Axes, history: ValveHistory, span: tuple[int, int]) ->
 
 
 def _with_room(points: Sequence[DatedNumber], span: tuple[int, int]) -> list[DatedNumber]:
-    """Return, for each place on the time axis, the point of the middle friction."""
+    """Return the point with the median friction for each place on the time axis."""
     size = max((span[1] - span[0]) // _PLACES, 1)
     places: dict[int, list[DatedNumber]] = {}
     for point in points:
@@ -244,13 +244,13 @@ _RENEWED = "#009E73"
 
 
 def used_days(usage: ValveUsage, span: tuple[int, int]) -> tuple[UsedDay, ...]:
-    """Return the days that lie within a time, ns, at least in part."""
+    """Return the days that overlap a time span, ns."""
     begin, end = span
     return tuple(one for one in usage.days if one.day * DAY < end and (one.day + 1) * DAY > begin)
 
 
 def draw_usage(axes: Axes, usage: ValveUsage, span: tuple[int, int]) -> None:
-    """Draw the travelled distance of each day of a time axis of this span, ns, and the renewals."""
+    """Draw travel per day and packing renewals on a time axis of this span, ns."""
     days = used_days(usage, span)
     numbers = sorted({one.day for one in days})
     sums = [sum(one.usage.distance for one in days if one.day == day) for day in numbers]
@@ -272,30 +272,30 @@ def draw_usage(axes: Axes, usage: ValveUsage, span: tuple[int, int]) -> None:
 
 
 MOST_PANELS = 12
-"""Most valves on one page. Chosen: still readable."""
+"""Maximum number of valves on one page. Chosen: still readable."""
 
 
 _USAGE_HEIGHT = 1.5
-"""Height of the panel of the usage, inches."""
+"""Height of the usage panel, inches."""
 
 
 def trend_figure(histories: Sequence[ValveHistory], now: int | None = None) -> Figure:
-    """Draw the friction of valves over time, one panel per valve, over one time axis.
+    """Draw the friction of valves over a common time axis, one panel per valve.
 
-    It is the sliding friction at the speed of the last baseline, where that has one, else F_c.
-    Below it is the travelled distance of each day, where any was counted within that time.
+    The panel shows the sliding friction at the speed of the last baseline if that has one, else
+    F_c. A panel below it shows the travel per day, if any was counted in that time.
 
     Parameters
     ----------
     histories : sequence of ValveHistory
         One to `MOST_PANELS`.
     now : int, optional
-        Today, ns since 1970 (UTC), to be marked where it is not far from the history.
+        Today, ns since 1970 (UTC), marked unless it is far from the history.
 
     Returns
     -------
     Figure
-        To be saved or shown; no global state of matplotlib is touched.
+        Figure to save or show; matplotlib's global state is not changed.
 
     Raises
     ------
@@ -330,7 +330,7 @@ def trend_figure(histories: Sequence[ValveHistory], now: int | None = None) -> F
 def report_trend_figure(
     history: ValveHistory, now: int | None = None, is_narrow: bool = False
 ) -> Figure:
-    """Draw the friction of one valve over time, for the page of a report, without a title."""
+    """Draw the friction of one valve over time for a report page, without a title."""
     figure = Figure(figsize=(3.7 if is_narrow else 7.1, 4.2), layout="constrained")
     axes = figure.subplots()
     span = span_of_time([history], now)
@@ -354,16 +354,16 @@ def report_trend_figure(
 
 
 _DAYS_SHOWN = 31
-"""Last days that are drawn."""
+"""Number of the latest days to draw."""
 _FEWEST_DAYS = 7
-"""Days on the axis; around a single one matplotlib would show hours."""
+"""Days on the axis; matplotlib would show hours around a single day."""
 _USAGE_COLOUR = "#0072B2"
 
 
 def usage_figure(usage: ValveUsage, is_narrow: bool = False) -> Figure:
-    """Draw the time at each 5 % of the travel, and the distance of each of the last 31 days.
+    """Draw the time at each 5 % of travel, and the distance travelled on each of the last 31 days.
 
-    Both are those of the packing in use; on a narrow page one is below the other. Raises
+    Both cover the present packing only. A narrow page shows them one below the other. Raises
     ValueError if the valve was not watched.
     """
     used = usage.since_renewal

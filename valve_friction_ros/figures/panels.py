@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""What figures share: the page, the data of a record, panels in the paper's units, and files."""
+"""Common parts of figures: page, record data, panels in the paper's units, and picture files."""
 
 import io
 import math
@@ -35,17 +35,17 @@ from valve_friction_ros.records.files import write_whole
 from valve_friction_ros.wording import with_width
 
 _TITLE_WIDTH, _NOTE_WIDTH = 95, 130
-"""Characters of a line of the title and of the notes, which fill the width of the figure."""
+"""Characters per line of title and notes; they fill the width of the figure."""
 
 _MOST_NOTES = 3
-"""Notes on a figure; more would take the room of the panels."""
+"""Notes on a figure; more would leave too little room for the panels."""
 
 _LEGEND_PAD = 0.2
-"""Room above and below the legend of a figure, in heights of its letters."""
+"""Padding above and below the legend of a figure, in font sizes."""
 
 
 class _Shown(Figure):
-    """A figure that a notebook shows, also where nobody has imported pyplot."""
+    """A figure that a notebook shows even without pyplot."""
 
     def _repr_png_(self) -> bytes:
         content = io.BytesIO()
@@ -54,12 +54,13 @@ class _Shown(Figure):
 
 
 def titled_figure(title: str, notes: Sequence[str] = ()) -> Figure:
-    """Return an empty figure with `title`, wrapped, above it, and the first notes below it.
+    """Return an empty figure with a wrapped title above it and the first notes below it.
 
-    The title is of this package; notes may hold text from outside, which is never read as maths.
+    The title comes from this package. Notes may contain text from outside, which is never parsed as
+    maths.
     """
     figure = _Shown(figsize=(11, 8.5), layout="constrained", dpi=110)
-    title = title.replace(" %", "\N{NO-BREAK SPACE}%")  # which textwrap leaves whole
+    title = title.replace(" %", "\N{NO-BREAK SPACE}%")  # textwrap does not break it
     figure.suptitle(
         textwrap.fill(title, _TITLE_WIDTH), fontsize=12, fontweight="bold", x=0.02, ha="left"
     )
@@ -75,14 +76,14 @@ def titled_figure(title: str, notes: Sequence[str] = ()) -> Figure:
 
 
 def dress(panels: Iterable[Axes]) -> None:
-    """Give panels a faint grid, and remove the sides of the frame without a scale."""
+    """Give panels a faint grid, and remove the top and right sides of the frame."""
     for axes in panels:
         axes.grid(alpha=0.3)
         axes.spines[["top", "right"]].set_visible(False)
 
 
 def labelled_in(panels: Iterable[Axes]) -> dict[str, Artist]:
-    """Return what a legend of panels lists, by its label, each label once."""
+    """Return the legend entries of panels by label, each label once."""
     return {
         label: handle
         for axes in panels
@@ -93,10 +94,10 @@ def labelled_in(panels: Iterable[Axes]) -> dict[str, Artist]:
 def legend_above(
     figure: Figure, entries: Mapping[str, Artist], columns: int, place: str = "center"
 ) -> None:
-    """Put a legend at the upper edge of a figure without a title, and its panels below it.
+    """Put a legend at the upper edge of a figure without a title, and the panels below it.
 
-    `place` is left, center or right. Needs no more than matplotlib 3.6, to which a legend outside
-    the panels is unknown.
+    `place` is left, center or right. This works with matplotlib 3.6, which cannot place a legend
+    outside the panels by itself.
     """
     legend = figure.legend(
         list(entries.values()),
@@ -113,7 +114,7 @@ def legend_above(
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """A record with what its identification offers to be drawn.
+    """A record and the drawable parts of its identification.
 
     Attributes
     ----------
@@ -122,9 +123,9 @@ class Case:
     recording : Recording
         Drive and stem position.
     drawing : Drawing
-        What the method adds.
+        Additions by the method.
     stem : StemComparison or None
-        The model's stem beside the measured one.
+        Simulated and measured stem position.
     """
 
     label: str
@@ -143,7 +144,7 @@ def _format(path: Path) -> str:
 
 
 def require_picture_file(path: Path) -> None:
-    """Refuse a file that a figure cannot be saved to, before the work begins.
+    """Refuse an unsuitable picture file before the work begins.
 
     Raises
     ------
@@ -158,12 +159,12 @@ def require_picture_file(path: Path) -> None:
 
 
 def save_picture(figure: Figure, path: Path) -> None:
-    """Draw a figure into a file in the format of its ending.
+    """Save a figure to a file in the format of its ending.
 
     Raises
     ------
     OSError
-        If it cannot be written; it names `path`, and no part of the picture stays.
+        If the file cannot be written. It names `path`; no partial picture remains.
     """
     content = io.BytesIO()
     figure.savefig(content, format=_format(path))
@@ -171,20 +172,20 @@ def save_picture(figure: Figure, path: Path) -> None:
 
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7")
-"""Colours of Okabe and Ito: colour-blind readers can distinguish them."""
+"""Colours of Okabe and Ito, which colour-blind readers can distinguish."""
 
 
 SYMBOLS = {"coulomb_friction": "F_c", "viscous_friction": "F_v", "spring_constant": "k"}
-"""The parameters that figures name, by their symbols."""
+"""Symbols of the parameters that figures name."""
 
 _PALE = 0.4
-"""Opacity of a curve on which another one stays visible, in print too."""
+"""Opacity of a curve; another curve drawn on it remains visible, in print too."""
 
 _LEAST_TICKS = 3
-"""Ticks that a logarithmic axis needs, so that it can be read."""
+"""Minimum number of ticks for a readable logarithmic axis."""
 
 _MOST_POINTS = 20_000
-"""Most points drawn of a record. Chosen: ten for each pixel of the width, so that peaks stay."""
+"""Maximum number of points to draw per record. Chosen: ten per pixel of width keep the peaks."""
 
 
 def thinned(size: int) -> slice:
@@ -193,7 +194,7 @@ def thinned(size: int) -> slice:
 
 
 def draw_record(drive_axes: Axes, stem_axes: Axes, cases: Sequence[Case]) -> None:
-    """Draw drive and stem position over the time since the first record began."""
+    """Draw drive and stem position over the time since the start of the first record."""
     origin = cases[0].recording.start_time
     for case, colour in zip(cases, COLOURS, strict=False):
         recording = case.recording
@@ -225,7 +226,7 @@ def draw_record(drive_axes: Axes, stem_axes: Axes, cases: Sequence[Case]) -> Non
 def draw_curves(
     axes: Axes, curves: Sequence[Curve], x_unit: float, marker_colour: str = "black"
 ) -> None:
-    """Draw curves of a method on the stem position, in mm, over what has this unit."""
+    """Draw curves of a method on the stem position, mm, over an x axis in units of `x_unit`."""
     colours = iter(COLOURS[1:] * len(curves))
     for curve in curves:
         x, y = curve.scaled(x_unit, 1e-3)
@@ -245,7 +246,7 @@ def draw_curves(
 
 
 def draw_signature(axes: Axes, cases: Sequence[Case]) -> None:
-    """Draw the valve signature: stem position over the drive, with what the method adds."""
+    """Draw the valve signature: stem position over drive, with the additions of the method."""
     for case, colour in zip(cases, COLOURS, strict=False):
         recording, some = case.recording, thinned(len(case.recording))
         label = case.label if len(cases) > 1 else None
@@ -274,7 +275,7 @@ def _told(parameter: Parameter) -> str:
 
 
 def _draw_level(axes: Axes, level: Parameter, colour: str) -> list[float]:
-    """Draw a parameter with its interval as a band; return its place, if it has one."""
+    """Draw a parameter with its interval as a band, and return its value if it has one."""
     if math.isnan(level.value):
         return []
     axes.axhline(level.value, color=colour, ls="--", lw=1.0)
@@ -283,7 +284,7 @@ def _draw_level(axes: Axes, level: Parameter, colour: str) -> list[float]:
 
 
 def _tell_levels(axes: Axes, panels: Mapping[str, Panel]) -> None:
-    """Write parameters with their verdicts into the upper left corner, where no sweep begins."""
+    """Write parameters with their verdicts into the upper left corner, clear of the sweeps."""
     told = [(colour, _told(one.level)) for colour, one in panels.items() if one.level is not None]
     for row, (colour, words) in enumerate(told):
         axes.annotate(
@@ -311,7 +312,7 @@ def _make_logarithmic(axes: Axes) -> None:
 
 
 def _draw_curve(axes: Axes, curve: Curve, colour: str, label: str) -> None:
-    """Draw a curve of a panel with its intervals: a band about a line, bars at markers."""
+    """Draw a curve with its intervals: a band around a line, error bars at markers."""
     x, y = curve.scaled(1.0, 1.0)
     half_width = None if curve.half_width is None else np.asarray(curve.half_width)
     if not curve.is_line:
@@ -335,7 +336,7 @@ def _draw_curve(axes: Axes, curve: Curve, colour: str, label: str) -> None:
 
 
 def draw_panel(axes: Axes, panels: Mapping[str, Panel]) -> None:
-    """Draw the same panel of one or several cases, by their colours."""
+    """Draw the same panel of one or several cases, each in its colour."""
     levels, labels = [0.0], {""}
     for colour, panel in panels.items():
         for curve in panel.curves:
@@ -362,7 +363,7 @@ def draw_panel(axes: Axes, panels: Mapping[str, Panel]) -> None:
 
 
 def draw_panels(axes: Mapping[str, Axes], cases: Sequence[Sequence[Panel]]) -> None:
-    """Draw panels, by name, of the cases that have them; those below share the x label."""
+    """Draw panels by name for the cases that have them; only the lowest panel has an x label."""
     for name, place in axes.items():
         found = {
             colour: panel

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Figures of a record: its identification, its validation, its report; and of a planned test."""
+"""Figures of a record: identification, validation and report; and of a planned test."""
 
 import math
 import textwrap
@@ -51,21 +51,21 @@ def friction_figure(cases: Sequence[Case], title: str, notes: Sequence[str] = ()
     Parameters
     ----------
     cases : sequence of Case
-        One to four, in the order of time.
+        One to four cases in order of time.
     title : str
         One sentence, printed above the panels.
     notes : sequence of str
-        Printed below them, in small letters.
+        Printed below the panels in small type.
 
     Returns
     -------
     Figure
-        To be saved or shown; no global state of matplotlib is touched.
+        Figure to save or show; matplotlib's global state is not changed.
 
     Raises
     ------
     ValueError
-        If `cases` is empty, or holds more cases than distinct colours.
+        If `cases` is empty or holds more cases than there are colours.
     """
     if not 0 < len(cases) <= len(COLOURS):
         raise ValueError(f"one to {len(COLOURS)} cases can be drawn, got {len(cases)}")
@@ -98,7 +98,7 @@ def identification_figure(result: Result) -> Figure:
 
 
 def _identification_title(result: Result) -> str:
-    """Name the sliding friction first; beside it, what is not known is left out."""
+    """Name the sliding friction first; if it is known, leave out unknown parameters."""
     found, sliding = result.parameters, result.parameters.get(SLIDING)
     is_known = sliding is not None and math.isfinite(sliding.value)
     parts = [_with_verdict("sliding friction", sliding)] if sliding and is_known else []
@@ -122,19 +122,19 @@ def _with_verdict(words: str, one: Parameter) -> str:
 
 
 def validation_figure(validation: Validation, valve: Valve) -> Figure:
-    """Draw measured and simulated stem over the time, the residual, and the drive.
+    """Draw measured and simulated stem, residual and drive over time.
 
     Parameters
     ----------
     validation : Validation
         Record and simulated stem.
     valve : Valve
-        Gives the travel, for the title.
+        Valve whose travel appears in the title.
 
     Returns
     -------
     Figure
-        To be saved or shown; no global state of matplotlib is touched.
+        Figure to save or show; matplotlib's global state is not changed.
     """
     share = valve.share_of_travel(validation.rms)
     of_travel = f" ({percentage(share)} of travel)" if math.isfinite(share) else ""
@@ -161,7 +161,7 @@ def validation_figure(validation: Validation, valve: Valve) -> Figure:
 
 
 def plan_figure(plan: StrokePlan) -> Figure:
-    """Draw the pressure before the converter, and the stem of each valve of the range.
+    """Draw the pressure before the converter, and the expected stem for each assumed friction.
 
     Parameters
     ----------
@@ -171,7 +171,7 @@ def plan_figure(plan: StrokePlan) -> Figure:
     Returns
     -------
     Figure
-        To be saved or shown; no global state of matplotlib is touched.
+        Figure to save or show; matplotlib's global state is not changed.
     """
     test, travel = plan.test, plan.valve.travel
     figure = titled_figure(f"planned stroke test: {test.duration:.3g} s, {test.cycles} cycles")
@@ -197,23 +197,23 @@ def plan_figure(plan: StrokePlan) -> Figure:
 
 
 _PAPER_WIDTH = 7.1
-"""Between the margins of an A4 page, inches."""
+"""Width between the margins of an A4 page, inches."""
 
 _PANEL_HEIGHT = 3.4
 """Height of a panel without another below it, inches."""
 
 _HALF_WIDTH = 3.45
-"""Width of one of two pictures beside each other, inches."""
+"""Width of each of two pictures side by side, inches."""
 
 _PANEL_TITLE_WIDTH = 42
-"""Characters of a line above a panel, on a narrow screen too."""
+"""Characters per line of a panel title that fits a narrow screen."""
 
 _PALE = "#8CC5E8"
-"""Pale, so that curves on it stay visible."""
+"""Pale colour; curves drawn on it remain visible."""
 
 _LAGS = 200
 _BINS = 60
-"""Lags and bins of the residual's panels. Chosen: readable at the width of a page."""
+"""Lags and bins in the panels of the residual. Chosen: readable at page width."""
 
 
 def _paper_figure(height: float) -> Figure:
@@ -221,7 +221,7 @@ def _paper_figure(height: float) -> Figure:
 
 
 def record_figure(recording: Recording) -> Figure:
-    """Draw drive and measured stem position over the time."""
+    """Draw drive and measured stem position over time."""
     figure = _paper_figure(2.9)
     pressure, stem = figure.subplots(2, 1, sharex=True)
     draw_record(pressure, stem, [Case("", recording, Drawing())])
@@ -230,7 +230,7 @@ def record_figure(recording: Recording) -> Figure:
 
 
 def signature_loop_figure(result: Result, healthy: Recording | None = None) -> Figure:
-    """Draw stem position over the drive, with what the method adds, on that of the baseline."""
+    """Draw the valve signature with the additions of the method, over that of the baseline."""
     figure = _paper_figure(_PANEL_HEIGHT)
     axes = figure.subplots()
     if healthy is not None:
@@ -246,7 +246,7 @@ def signature_loop_figure(result: Result, healthy: Recording | None = None) -> F
 
 
 def evidence_figure(drawing: Drawing) -> Figure:
-    """Draw the panels of a method, with the region that it chose shaded."""
+    """Draw the panels of a method, with its chosen region shaded."""
     count = len(drawing.panels)
     figure = _paper_figure(1.5 * count if count > 1 else _PANEL_HEIGHT)
     ratios = [2, *[1] * (count - 1)]
@@ -262,7 +262,7 @@ def evidence_figure(drawing: Drawing) -> Figure:
 
 
 def comparison_figure(comparison: StemComparison) -> Figure:
-    """Draw the measured stem over the time, and the simulated stem as a dotted line on it."""
+    """Draw the measured stem over time, with the simulated stem as a dotted line on it."""
     figure = _paper_figure(2.7)
     axes = figure.subplots()
     some = thinned(comparison.measured.size)
@@ -277,7 +277,7 @@ def comparison_figure(comparison: StemComparison) -> Figure:
 
 
 def residual_figure(comparison: StemComparison) -> Figure:
-    """Draw the residual over the time."""
+    """Draw the residual over time."""
     figure = _paper_figure(2.2)
     axes = figure.subplots()
     residual = comparison.residual * 1e6
@@ -291,7 +291,7 @@ def residual_figure(comparison: StemComparison) -> Figure:
 
 
 def noise_figures(comparison: StemComparison) -> tuple[Figure, Figure]:
-    """Draw the histogram of the residual, and its autocorrelation."""
+    """Draw histogram and autocorrelation of the residual."""
     residual = comparison.residual * 1e6
     figures = [Figure(figsize=(_HALF_WIDTH, 2.3), layout="constrained") for _ in range(2)]
     histogram, axes = (figure.subplots() for figure in figures)
@@ -300,7 +300,7 @@ def noise_figures(comparison: StemComparison) -> tuple[Figure, Figure]:
     histogram.set_ylabel("samples")
     correlation = comparison.autocorrelation(min(_LAGS, residual.size))
     lags = np.arange(correlation.size) * comparison.sample_period
-    chance = 1.96 / math.sqrt(residual.size)  # holds 95 % of the autocorrelations of white noise
+    chance = 1.96 / math.sqrt(residual.size)  # 95 % band of the autocorrelation of white noise
     axes.plot(lags, correlation, color=COLOURS[1], lw=1.2)
     axes.axhspan(-chance, chance, color="black", alpha=0.15, lw=0)
     axes.set_ylim(-1.05, 1.05)
