@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Reports for people: pages that stand in one file; no ROS."""
+"""Reports for people: self-contained HTML pages; no ROS."""
 
 from valve_friction_ros.reports.identification_report import (
     identification_report as identification_report,

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The report of one identification: a page from the diagnosis to the settings."""
+"""The report of an identification: one page from the diagnosis to the settings."""
 
 import math
 import time
@@ -76,7 +76,7 @@ _BUDGET = (
     "the root of the sum of the squares of a row."
 )
 _ALL_NOISE = 0.05
-"""Share of a misfit, below which what is not noise is not told. Chosen: 0.1 % of its square."""
+"""Share of the misfit below which its systematic part is not mentioned. Chosen."""
 
 _NO_STEM = (
     "The spring is zero or not identifiable, so the stem cannot be simulated: no force returns it. "
@@ -85,13 +85,13 @@ _NO_STEM = (
 
 
 def identification_report(record: IdentifiedRecord) -> Page:
-    """Return the page on an identified record: its parameters and the evidence for them.
+    """Return the page on an identified record: its parameters and their evidence.
 
-    The status, the diagnosis in one sentence and the date, then parameters, uncertainty budget,
-    friction against its baseline, the other numbers of the valve against theirs, trend, use, the
-    answer to the command, the record, the valve signature, the evidence of the method, the measured
-    against the simulated position, the residual, notes, settings and versions. Parts that a method
-    does not have are left out.
+    The page begins with status, diagnosis in one sentence, and date. Sections follow: parameters,
+    uncertainty budget, friction and other numbers of the valve compared with the baseline, trend,
+    use, answer to the command, record, valve signature, evidence of the method, measured and
+    simulated position, residual, notes, settings and versions. Sections without content are left
+    out.
     """
     return Page(
         f"Friction of {record.name}",
@@ -108,7 +108,7 @@ def write_identification_report(path: Path, facts: Mapping[str, Any]) -> None:
     Raises
     ------
     OSError
-        If it cannot be written.
+        If the file cannot be written.
     """
     write_report(identification_report(IdentifiedRecord(**facts)), path)
 
@@ -266,10 +266,10 @@ _NO_LIMIT = (
 def usage_section(
     usage: ValveUsage, valve: Valve, limits: Sequence[LimitState] | None = None
 ) -> Section | None:
-    """Return the table of the usage, since the packing was renewed and in all, and its figure.
+    """Return table and figure of the usage, since the renewal of the packing and in total.
 
-    With the `limits` of the packing, if they are known, beside when each is expected to be reached.
-    None for a valve that was not watched.
+    With `limits`, add each limit of the packing and when it is expected to be reached. Return None
+    for a valve that was not watched.
     """
     used, everything = usage.since_renewal, usage.total
     if not everything.time_watched:
@@ -300,7 +300,7 @@ def usage_section(
 
 
 def _life(limits: Sequence[LimitState]) -> tuple[PageTable | Paragraph, ...]:
-    """Return how far the packing is from its limits, and what to do."""
+    """Return the used share of each packing limit, and the advice."""
     if not limits:
         return (Paragraph(_NO_LIMIT),)
     titles = ("limit of the packing", "used", "limit", "share", "expected")
@@ -350,7 +350,7 @@ _CAUSES = (("dead time", "dead_time"), ("T86", "t86"), ("steady error", "deviati
 
 
 def response_section(response: ResponseSummary) -> Section | None:
-    """Return the table of the figures of the latest steps; None without any."""
+    """Return the figures of the latest command steps as tables, or None without a step."""
     if not response.moves:
         return None
     columns = ("median", "10 %", "90 %", "steps")

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The tables of a report of an identification."""
+"""Tables in the report of an identification."""
 
 import math
 import platform
@@ -50,13 +50,13 @@ _WORDS = {
 
 _NOTHING = "–"
 _WHOLE = 1e4
-"""Size from which numbers are written without decimals: five digits then remain."""
+"""Size from which numbers are written without decimals: they keep five digits."""
 _ROUNDED = 0.01
-"""Share of a variance that two digits of its root do not show. Chosen."""
+"""Share of a variance that is lost when its root is rounded to two digits. Chosen."""
 
 
 def written(value: float | None) -> str:
-    """Write five digits or more, without an exponent if possible."""
+    """Write a number to at least five digits, without an exponent if possible."""
     if value is None:
         return _NOTHING
     return f"{value:.0f}" if abs(value) >= _WHOLE else f"{value:.5g}"
@@ -86,7 +86,7 @@ def _cells(name: str, one: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def parameter_table(record: IdentifiedRecord) -> PageTable:
-    """Return each parameter with interval and verdict, and its published value if known."""
+    """Return the parameters with interval and verdict, and with published values if known."""
     shown = record.result.to_dict()["parameters"]
     columns = (
         Column("parameter"),
@@ -102,9 +102,9 @@ def parameter_table(record: IdentifiedRecord) -> PageTable:
 
 
 def budget_table(record: IdentifiedRecord) -> PageTable | None:
-    """Return the standard uncertainty of each estimate by its sources.
+    """Return the standard uncertainty of each estimate by source.
 
-    It is None for a method whose evidence holds no ``uncertainty_budget``.
+    Return None for a method whose evidence has no ``uncertainty_budget``.
     """
     shown = record.result.to_dict()
     parameters, budget = shown["parameters"], shown["evidence"].get("uncertainty_budget")
@@ -128,7 +128,7 @@ def budget_table(record: IdentifiedRecord) -> PageTable | None:
 
 
 def _left(whole: float, parts: Iterable[float]) -> float:
-    """Return what the squares of parts leave of a standard uncertainty, 0 where they make it up."""
+    """Return the rest of a standard uncertainty beyond its parts, 0 if they make it up."""
     left = whole**2 - sum(one**2 for one in parts)
     return math.sqrt(left) if left > _ROUNDED * whole**2 else 0.0
 
@@ -138,7 +138,7 @@ def _pairs(rows: list[tuple[str, str]], first: str, second: str) -> PageTable:
 
 
 def friction_table(record: IdentifiedRecord) -> PageTable:
-    """Return the friction beside its baseline, and the diagnosis."""
+    """Return the friction compared with its baseline, and the diagnosis."""
     baseline, diagnosis, limits = record.baseline, record.diagnosis, record.limits
     rows, found = [], None
     if baseline is not None:
@@ -186,7 +186,7 @@ def _level(record: IdentifiedRecord) -> str:
 
 
 def record_table(record: IdentifiedRecord) -> PageTable:
-    """Return the source of the record, and its extent."""
+    """Return source and extent of the record."""
     recording, drive = record.recording, record.recording.driven_by
     shown, position = recording.drive / drive.size, recording.position * 1e3
     rows: list[tuple[str, str]] = [("source", Verbatim(record.source))]
@@ -247,7 +247,7 @@ def settings_table(record: IdentifiedRecord) -> PageTable:
 
 
 def _timing(shown: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Return the timing uncertainty of a method that counts with one."""
+    """Return the timing uncertainty, for a method that uses it."""
     budget = shown["evidence"].get("uncertainty_budget", {})
     if not any("timing" in sources for sources in budget.values()):
         return []
@@ -258,7 +258,7 @@ def _timing(shown: Mapping[str, Any]) -> list[tuple[str, str]]:
 
 
 def _calibration(settings: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Return the relative standard uncertainties of the scales that have one."""
+    """Return the relative standard uncertainties of the scales, where given."""
     return [
         (f"relative standard uncertainty of {what}", percentage(settings[name]))
         for name, what in CALIBRATION.items()
@@ -267,7 +267,7 @@ def _calibration(settings: Mapping[str, Any]) -> list[tuple[str, str]]:
 
 
 def _versions() -> str:
-    """Return the versions of the software on which the numbers depend."""
+    """Return the versions of the software that affects the numbers."""
     versions = {
         "valve_friction_ros": valve_friction_ros.__version__,
         "numpy": np.__version__,
@@ -280,7 +280,7 @@ def _versions() -> str:
 
 
 def valve_table(record: IdentifiedRecord) -> PageTable | None:
-    """Return each number that result and baseline both have, with its change; None without one."""
+    """Return the numbers that result and baseline share, with their changes, or None."""
     if record.baseline is None:
         return None
     drive = "Pa" if record.recording.driven_by.unit == "kPa" else "N"
@@ -313,7 +313,7 @@ _UNKNOWN_THRESHOLD = "samples faster than a threshold δv"
 
 
 def published_words(result: Result) -> str:
-    """Return why published values and values differ, and where they do; empty without any."""
+    """Return why and where published values differ from the values; empty without any."""
     beside = [one for one in result.parameters.values() if not math.isnan(one.published)]
     if not beside or result.method in ("published", "signature"):
         return ""
@@ -338,7 +338,7 @@ def published_words(result: Result) -> str:
 
 
 def _how_else(result: Result) -> str:
-    """Say how the value is found, where that is known of the method."""
+    """Say how the method finds the value, if known."""
     if result.stem is not None:
         samples = "over all samples"
         if "uncertainty_budget" in result.evidence:

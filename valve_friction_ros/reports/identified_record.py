@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The content of a report of an identification; its status, and its diagnosis in one sentence."""
+"""Content of the report of an identification, with its status and one-sentence diagnosis."""
 
 import math
 from collections.abc import Sequence
@@ -53,7 +53,7 @@ from valve_friction_ros.wording import (
 
 @dataclass(frozen=True, eq=False)
 class IdentifiedRecord:
-    """A record, its result, and the baseline and limits for its diagnosis.
+    """A record and its result, with baseline and limits for the diagnosis.
 
     Attributes
     ----------
@@ -70,23 +70,23 @@ class IdentifiedRecord:
     notes : tuple of str
         Limitations of the record, one sentence each.
     dated : str
-        Further date, such as that of the file or of the identification, in words.
+        A further date in words, such as that of the file or of the identification.
     healthy : Recording or None
-        Record of the baseline, to be drawn beside this one.
+        Record of the baseline, drawn in the same panel.
     history : ValveHistory or None
-        What was identified of this valve before.
+        Earlier identifications of this valve.
     usage : ValveUsage
-        What the valve has done.
+        Travel, reversals and time of the valve in service.
     response : ResponseSummary or None
-        Its answers to steps of its command.
+        Answers of the valve to command steps.
     usage_limits : tuple of LimitState or None
-        How far the packing is from its limits; None where they are not known.
+        State of the packing limits; None if unknown.
     valve_limits : ValveLimits
-        Bounds of what else may change on the valve.
+        Bounds of the other numbers of the valve.
     known : KnownNumbers or None
-        What is known of the valve, also by earlier records; None: by the result alone.
+        Numbers of the valve from this and earlier records; None: from this result alone.
     zone : str
-        Zone of the time of the record, an IANA name; empty: UTC.
+        Time zone for the date of the record, an IANA name; empty for UTC.
     """
 
     name: str
@@ -130,7 +130,7 @@ class IdentifiedRecord:
 
     @property
     def is_scaled(self) -> bool:
-        """Whether one factor explains what is found on friction and spring together."""
+        """Whether one common factor explains the changes of both friction and spring."""
         return explains(self._factor, self._friction)
 
     @cached_property
@@ -139,19 +139,19 @@ class IdentifiedRecord:
 
     @property
     def numbers(self) -> dict[str, Measured]:
-        """What is known of the valve beside its friction."""
+        """Known numbers of the valve other than its friction."""
         return self._known.numbers
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """What has changed on the valve beside its friction, the most severe first."""
+        """Changes of the valve other than its friction, the most severe first."""
         return tuple(
             by_severity(self._known.findings(self.baseline, self.valve, self.valve_limits))
         )
 
 
 _DATED = (1e9, 1e11)
-"""Start times, s, that count from 1970: they lie between the years 2001 and 5138."""
+"""Range of start times that are seconds since 1970: years 2001 to 5138."""
 
 _STATUS = {
     FrictionState.EXCESS: Conclusion(Colour.RED, "Excess friction", "failure (NE 107: F)"),
@@ -171,7 +171,7 @@ _STATUS = {
 
 
 def valve_status(record: IdentifiedRecord) -> Conclusion:
-    """Return the status; green only where a comparison with a baseline found nothing."""
+    """Return the status; green only if a comparison with the baseline found nothing."""
     diagnosis = record.diagnosis
     worst = next(iter(record.findings), None)
     if worst is not None and worst.level > diagnosis.level:
@@ -206,7 +206,7 @@ def _why_unknown(record: IdentifiedRecord) -> str:
 
 
 def began(record: IdentifiedRecord) -> datetime | None:
-    """Return when a record began; None where its time does not count from 1970."""
+    """Return the start of a record, or None if its time is not in seconds since 1970."""
     start = record.recording.start_time
     if not _DATED[0] < start < _DATED[1]:
         return None
@@ -247,9 +247,9 @@ _SURVEY_ADVICE = {
 
 
 def what_to_do(diagnosis: Diagnosis, findings: Sequence[Finding] = ()) -> str:
-    """Return the advice that goes with a diagnosis, in a few words for a list of valves.
+    """Return the advice for a diagnosis, in a few words for a list of valves.
 
-    Without a comparison it is that of the first survey, by absolute limits.
+    Without a comparison the advice comes from the first survey, by absolute limits.
     """
     advice = friction_advice(diagnosis.state.name) or finding_advice(diagnosis.statement)
     if not advice and findings:
@@ -264,10 +264,10 @@ def what_to_do(diagnosis: Diagnosis, findings: Sequence[Finding] = ()) -> str:
 
 
 def diagnosis_sentence(record: IdentifiedRecord) -> str:
-    """Return one sentence: finding, certainty, consequence and advice.
+    """Return the diagnosis in one sentence: finding, certainty, consequence and advice.
 
-    What else has changed on the valve follows, one sentence each. It states the diagnosis of the
-    monitor in words for readers outside control engineering.
+    It states the diagnosis of the monitor for readers outside control engineering. Other changes of
+    the valve follow, one sentence each.
     """
     friction = _friction(record)
     state = record.diagnosis.state
@@ -299,9 +299,9 @@ def _frictions(record: IdentifiedRecord) -> list[Parameter]:
 
 
 def _friction(record: IdentifiedRecord) -> Parameter:
-    """Return the friction that was compared; without a comparison one that is known, F_c if it is.
+    """Return the friction that was compared; without a comparison a known one, preferably F_c.
 
-    One below zero comes first: it is a fault of the signals.
+    A negative friction comes first: it is a fault of the signals.
     """
     ratio, frictions = record.diagnosis.ratio, _frictions(record)
     if ratio is not None:
@@ -337,7 +337,7 @@ def _found(record: IdentifiedRecord) -> _Finding:
 
 
 def _sureness(friction: Parameter) -> str:
-    """Return the limitation of the number, or an empty string if it is identified."""
+    """Return how far the number is limited, or an empty string if it is identified."""
     words = {
         Verdict.IDENTIFIED: "",
         Verdict.WEAK: f", but this value is weak ({friction.reason})",

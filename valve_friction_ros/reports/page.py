@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""A report page: its content, its rendering as one self-contained HTML file, and that file."""
+"""A report page: its content, and its rendering as one self-contained HTML file."""
 
 import base64
 import html
@@ -32,13 +32,13 @@ _MINUS = re.compile(r"(?<![\w.-])-(?=\d)")
 
 
 class Verbatim(str):
-    """Text from outside, such as the name of a file: it is shown as it is."""
+    """Text from outside, such as a file name, shown unchanged."""
 
     __slots__ = ()
 
 
 def typeset(text: str) -> str:
-    """Escape a text, and set F_c with a subscript and -1 with a minus sign."""
+    """Escape a text, and typeset F_c with a subscript and -1 with a minus sign."""
     escaped = html.escape(text)
     if not isinstance(text, Verbatim):
         escaped = _MINUS.sub("−", _SYMBOL.sub(r"\1<sub>\2</sub>", escaped))
@@ -49,10 +49,10 @@ _DOTS_PER_INCH = 150
 """Resolution of the pictures. Chosen: sharp on paper, and about 100 kB each."""
 
 _NARROW, _NARROW_DOTS = 3.7, 200
-"""Width, inches, and resolution of a picture on a narrow screen: its text is 13 px high there."""
+"""Width, inches, and resolution of a picture for a narrow screen, where its text is 13 px high."""
 
 _WIDEST = 7.5
-"""Width, inches, up to which a figure is laid out for a narrow screen."""
+"""Largest width, inches, of a figure that is laid out again for a narrow screen."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class Paragraph:
 
 @dataclass(frozen=True)
 class Column:
-    """Heading of a column, and whether it holds numbers, which are aligned right."""
+    """Heading of a column; numbers are aligned right."""
 
     title: str
     is_number: bool = False
@@ -74,10 +74,10 @@ class Column:
 
 @dataclass(frozen=True)
 class PageTable:
-    """Rows of text under headings, as many cells each as there are columns.
+    """Rows of text under headings, with one cell per column.
 
-    The caption stands above the table; `marked` rows, counted from 0, are highlighted. Raises
-    ValueError if a row has another number of cells, or a marked row does not exist.
+    The caption is printed above the table. `marked` rows, counted from 0, are highlighted. Raises
+    ValueError if a row has too few or too many cells, or if a marked row does not exist.
     """
 
     kind: ClassVar[str] = "table"
@@ -99,10 +99,10 @@ class PageTable:
 
 @dataclass(frozen=True, eq=False)
 class Picture:
-    """A figure, its caption, and its description for readers who cannot see it.
+    """A figure, its caption, and a description for readers who cannot see it.
 
-    A figure that is wider than a narrow screen is laid out a second time for that, unless `narrow`
-    takes its place there, or it is so wide that it has many panels.
+    A narrow screen shows `narrow` instead, if given. Otherwise a figure that is too wide is laid
+    out again for the narrow screen, unless it is so wide that it has many panels.
     """
 
     kind: ClassVar[str] = "picture"
@@ -114,12 +114,12 @@ class Picture:
 
     @cached_property
     def png(self) -> bytes:
-        """The picture itself, drawn once."""
+        """The picture as PNG, drawn once."""
         return _drawn(self.figure, _DOTS_PER_INCH)
 
     @cached_property
     def narrow_png(self) -> bytes | None:
-        """The picture for a narrow screen, with text of the same size, if there is one."""
+        """The picture for a narrow screen, with text of the same size, or None."""
         if self.narrow is not None:
             return _drawn(self.narrow, _NARROW_DOTS)
         width, height = self.figure.get_size_inches()
@@ -133,7 +133,7 @@ class Picture:
 
     @property
     def is_half(self) -> bool:
-        """Whether two such pictures stand beside each other on a wide page."""
+        """Whether a wide page shows two such pictures side by side."""
         return self.figure.get_figwidth() <= _NARROW
 
     @property
@@ -150,7 +150,7 @@ class Picture:
 def _drawn(figure: Figure, resolution: int) -> bytes:
     stream = io.BytesIO()
     figure.set_dpi(resolution)
-    # It lays out once; savefig does it twice.
+    # This computes the layout once; savefig does it twice.
     FigureCanvasAgg(figure).print_png(stream)  # type: ignore[no-untyped-call]
     return stream.getvalue()
 
@@ -172,7 +172,7 @@ class Section:
 
 
 class Colour(Enum):
-    """Colours of a status, each with the sign that tells it without colour."""
+    """Colours of a status, each with a sign that needs no colour."""
 
     GREEN = "✓"
     GREY = "?"
@@ -181,7 +181,7 @@ class Colour(Enum):
 
 
 class Conclusion(NamedTuple):
-    """The conclusion in a few words, and what it is called elsewhere."""
+    """The conclusion in a few words, with an explanation such as its NE 107 signal."""
 
     colour: Colour
     words: str
@@ -190,7 +190,7 @@ class Conclusion(NamedTuple):
 
 @dataclass(frozen=True)
 class Page:
-    """A page: title, status, one or two sentences with the conclusion, date, and the sections."""
+    """A page: title, status, conclusion in one or two sentences, date, and sections."""
 
     title: str
     lead: str
@@ -200,9 +200,9 @@ class Page:
 
 
 def render(page: Page) -> str:
-    """Return a page as one HTML file without scripts and without links to other files.
+    """Return a page as one HTML file without scripts or links to other files.
 
-    It reads on a screen of any width, and prints on A4.
+    It is readable on a screen of any width, and prints on A4.
     """
     environment = page_environment("valve_friction_ros.reports")
     environment.filters["typeset"] = typeset
@@ -213,10 +213,10 @@ _ENDINGS = (".html", ".htm")
 
 
 def require_report_file(path: Path) -> None:
-    """Refuse a file that a report cannot be written to, before the work begins.
+    """Refuse an unsuitable report file before the work begins.
 
-    Raises ValueError if the ending is not .html, or the folder does not exist or cannot be written;
-    the message names it.
+    Raises ValueError if the ending is not .html, or if the folder does not exist or is not
+    writable; the message names it.
     """
     if path.suffix.lower() not in _ENDINGS:
         raise ValueError(f"{path}: a report is an HTML page: give it a name that ends in .html")
@@ -233,8 +233,8 @@ def require_report_file(path: Path) -> None:
 
 
 def write_report(page: Page, path: Path) -> None:
-    """Write a page as one HTML file, at once: a reader never finds part of it.
+    """Write a page as one HTML file, atomically: a reader never finds part of it.
 
-    Raises OSError if it cannot be written; an existing file stays unchanged.
+    Raises OSError if it cannot be written; an existing file then remains unchanged.
     """
     write_whole(path, render(page).encode())
