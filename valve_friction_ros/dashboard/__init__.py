@@ -9,7 +9,7 @@
 
 """The dashboard: a plant's valves in a browser; no ROS.
 
-The files here hold what is shown, and import no library of pages; ``pages/`` draws it by NiceGUI.
+The modules here prepare the content without a web framework. ``pages/`` draws it with NiceGUI.
 """
 
 from typing import TYPE_CHECKING

@@ -7,12 +7,12 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Where a dashboard listens and whom it lets in: accounts, from a file or the environment.
+"""Address and access control of a dashboard: accounts from a file or the environment.
 
-Of passwords only a hash is kept. scrypt (RFC 7914) is in Python's standard library and needs memory
-as well as time, so that a stolen file cannot be tried quickly on graphics cards. Its cost is one of
-those that OWASP's *Password Storage Cheat Sheet* gives as equal: N = 2¹⁴, r = 8, p = 5; 16 MiB and
-some 0.2 s a try.
+Only a hash of each password is stored. scrypt (RFC 7914) is in Python's standard library and needs
+memory as well as time, which makes attacks on a stolen file with graphics cards slow. Its cost is
+one of the equivalent settings of OWASP's *Password Storage Cheat Sheet*: N = 2¹⁴, r = 8, p = 5,
+which takes 16 MiB and some 0.2 s per try.
 """
 
 import base64
@@ -33,13 +33,13 @@ from valve_friction_ros.loopback import is_loopback
 
 
 def require_private(file: Path) -> None:
-    """Raise ValueError if anybody but its owner can read or write a file."""
+    """Raise ValueError if anybody but the owner can read or write a file."""
     if file.stat().st_mode & 0o077:
         raise ValueError(f"{file} is open to others: run `chmod 600 {file}`")
 
 
 SHORTEST, LONGEST = 10, 200
-"""Characters of a new password, and of one that is tried."""
+"""Minimum and maximum number of characters in a password."""
 
 _KIND = "scrypt"
 _COST, _BLOCK, _PARALLEL = 14, 8, 5
@@ -59,20 +59,20 @@ def _decoded(text: str) -> bytes:
 class HashedPassword:
     """A salted hash of a password.
 
-    As text it is ``scrypt:14:8:5:SALT:DIGEST``, with the logarithm of N, r, p and two numbers in
-    base64; no character of it means anything to a shell.
+    Its text form is ``scrypt:14:8:5:SALT:DIGEST``: log₂ N, r, p, and salt and digest in base64. No
+    character in it is special to a shell.
 
     Attributes
     ----------
     cost, block, parallel : int
         log₂ N, r and p of scrypt.
     salt, digest : bytes
-        What was hashed with the password, and what came out.
+        The salt hashed with the password, and the result.
 
     Raises
     ------
     ValueError
-        If the cost is not one that a log-in can bear, or salt or digest are too short.
+        If the cost is outside the limits for a log-in, or salt or digest is too short.
     """
 
     cost: int
@@ -82,7 +82,7 @@ class HashedPassword:
     digest: bytes = field(repr=False)
 
     def __post_init__(self) -> None:
-        """Refuse what is no hash, or would take a machine's memory."""
+        """Refuse an invalid hash, or one that would exhaust the machine's memory."""
         if not (
             10 <= self.cost <= _MOST_COST
             and 1 <= self.block <= _MOST_BLOCK
@@ -94,9 +94,9 @@ class HashedPassword:
 
     @classmethod
     def of(cls, password: str) -> "HashedPassword":
-        """Hash a new password with a salt of its own.
+        """Hash a new password with a fresh salt.
 
-        Raises ValueError if it is shorter than `SHORTEST` or longer than `LONGEST` characters.
+        Raises ValueError if it has fewer than `SHORTEST` or more than `LONGEST` characters.
         """
         if not SHORTEST <= len(password) <= LONGEST:
             raise ValueError(
@@ -108,7 +108,7 @@ class HashedPassword:
 
     @classmethod
     def unknown(cls, like: "HashedPassword | None" = None) -> "HashedPassword":
-        """Return a hash that no password has; it takes as long as another, or as a new one."""
+        """Return a hash that matches no password, at the cost of `like` or of a new hash."""
         salt, digest = secrets.token_bytes(_SALT), secrets.token_bytes(_DIGEST)
         if like is not None:
             return replace(like, salt=salt, digest=digest)
@@ -116,7 +116,7 @@ class HashedPassword:
 
     @classmethod
     def read(cls, text: str) -> "HashedPassword":
-        """Read the text of a hash; raises ValueError, without the text, if it is none."""
+        """Read the text of a hash; raises ValueError, without quoting the text, if invalid."""
         kind, *rest = text.split(":")
         try:
             if kind != _KIND:
@@ -129,16 +129,16 @@ class HashedPassword:
             ) from None
 
     def __str__(self) -> str:
-        """Return the text that `read` reads."""
+        """Return the text form that `read` accepts."""
         numbers = f"{self.cost}:{self.block}:{self.parallel}"
         return f"{_KIND}:{numbers}:{_encoded(self.salt)}:{_encoded(self.digest)}"
 
     def matches(self, password: str) -> bool:
-        """Tell whether a password has this hash, in a time that says nothing of the digest."""
+        """Return whether a password matches, in a time that reveals nothing about the digest."""
         return hmac.compare_digest(self._hashed(password[:LONGEST]), self.digest)
 
     def _hashed(self, password: str) -> bytes:
-        # Keyboards differ in how they write an accented letter: NFKC is the one form of it.
+        # Keyboards encode accented letters differently; NFKC makes the forms equal.
         return hashlib.scrypt(
             unicodedata.normalize("NFKC", password).encode(errors="surrogatepass"),
             salt=self.salt,
@@ -151,13 +151,13 @@ class HashedPassword:
 
 
 VARIABLE = "VALVE_FRICTION_DASHBOARD_ACCOUNTS"
-"""Variable of the environment with accounts, where there is no file."""
+"""Environment variable with the accounts, if there is no file."""
 
 _NAME = re.compile(r"[\w.@+-]{1,64}")
 
 
 class Role(Enum):
-    """What an account may do: look only, or call the services of identifiers too."""
+    """Permission of an account: view only, or also call the services of identifiers."""
 
     VIEW = "view"
     OPERATE = "operate"
@@ -165,23 +165,23 @@ class Role(Enum):
 
 @dataclass(frozen=True)
 class Account:
-    """One who may log in.
+    """An account of the dashboard.
 
-    As text it is ``NAME ROLE HASH``, a line of the file of accounts.
+    Its text form is ``NAME ROLE HASH``, a line of the accounts file.
 
     Attributes
     ----------
     name : str
         Letters, digits and ``_.@+-``, 64 at most.
     role : Role
-        What they may do.
+        Permission of the account.
     password : HashedPassword
-        The hash of their password.
+        Hash of the password.
 
     Raises
     ------
     ValueError
-        If the name is none.
+        If the name is invalid.
     """
 
     name: str
@@ -189,20 +189,20 @@ class Account:
     password: HashedPassword
 
     def __post_init__(self) -> None:
-        """Refuse a name that is none."""
+        """Refuse an invalid name."""
         if not _NAME.fullmatch(self.name):
             raise ValueError("the name of an account has 1 to 64 letters, digits or _.@+-")
 
     @classmethod
     def read(cls, line: str) -> "Account":
-        """Read a line; raises ValueError, without what the line holds, if it is no account."""
+        """Read a line; raises ValueError, without quoting the line, if it is not an account."""
         words = line.split()
         if len(words) != 3 or words[1] not in {role.value for role in Role}:
             raise ValueError("not NAME, role (view or operate) and hash")
         return cls(words[0], Role(words[1]), HashedPassword.read(words[2]))
 
     def __str__(self) -> str:
-        """Return the line that `read` reads."""
+        """Return the line that `read` accepts."""
         return f"{self.name} {self.role.value} {self.password}"
 
 
@@ -228,15 +228,15 @@ def _read(text: str, source: str) -> tuple[Account, ...]:
 def accounts_from(
     file: Path | None, environment: Mapping[str, str] = os.environ
 ) -> tuple[Account, ...]:
-    """Return the accounts of a file or else of the environment; none where neither is given.
+    """Return the accounts from a file or else the environment; empty if neither is given.
 
-    The environment's are in `VARIABLE`, separated by semicolons or new lines.
+    The environment variable `VARIABLE` separates accounts by semicolons or new lines.
 
     Raises
     ------
     ValueError
-        If a line is no account, a name is there twice, others can read the file, or both the file
-        and the variable are given.
+        If a line is not an account, a name occurs twice, others can read the file, or both file and
+        variable are given.
     OSError
         If the file cannot be read.
     """
@@ -256,25 +256,24 @@ class Access:
     Attributes
     ----------
     host : str
-        Address that it listens at; ``0.0.0.0`` is all of IPv4's.
+        Address to listen on; ``0.0.0.0`` means all IPv4 addresses.
     host_names : tuple of str
-        Names by which browsers call it, beside its addresses and ``localhost``. Other names are
-        refused, since a foreign page can have a name that leads here.
+        Host names for browsers, besides the addresses and ``localhost``. Other names are refused,
+        since the name of a foreign page can resolve to this host.
     accounts : tuple of Account
-        Who may log in. Without any, whoever reaches the address may operate.
+        Accounts that may log in. Without accounts, anybody who reaches the address may operate.
     certificate, key : Path or None
         Files for TLS, in PEM.
     session_hours : float
-        Time after which a log-in ends, h.
+        Duration of a session, h.
     session_file : Path or None
-        Where sessions survive a restart; without it they do not.
+        File that keeps sessions across a restart; without it a restart ends them.
 
     Raises
     ------
     ValueError
-        If others can reach the dashboard and it has no accounts; if one of certificate and key is
-        missing, or they do not belong together, or others can read the key; if the time is not
-        positive.
+        If others can reach the dashboard and it has no accounts; if certificate or key is missing,
+        if they do not match, or if others can read the key; if the duration is not positive.
     OSError
         If certificate or key cannot be read.
     """
@@ -288,7 +287,7 @@ class Access:
     session_file: Path | None = None
 
     def __post_init__(self) -> None:
-        """Refuse what would let anybody in."""
+        """Refuse options that would let anybody in."""
         if not self.accounts and (not is_loopback(self.host) or self.host_names):
             raise ValueError(
                 f"host {self.host!r} lets others in, and there are no accounts: make one by "
@@ -305,12 +304,12 @@ class Access:
 
     @property
     def is_encrypted(self) -> bool:
-        """Whether it speaks TLS."""
+        """Whether connections use TLS."""
         return self.certificate is not None
 
     @property
     def warning(self) -> str:
-        """What its operator should know; empty if nothing."""
+        """Warning for the operator; empty if there is none."""
         if self.accounts and not self.is_encrypted and not is_loopback(self.host):
             return (
                 "no certificate: passwords and sessions can be read on the way; give "
@@ -319,17 +318,17 @@ class Access:
         return ""
 
     def answers_to(self, called: str, address: str) -> bool:
-        """Tell whether it is called by a name of its own.
+        """Return whether a request uses one of the dashboard's own host names.
 
         Parameters
         ----------
         called : str
-            What the browser calls it, the header ``Host`` without the port.
+            Host named by the browser: the header ``Host`` without the port.
         address : str
-            The address that the connection came in at.
+            Local address of the connection.
 
-        A page whose name leads here has its own name in that header (DNS rebinding). An address
-        is no name, so the one that was connected to is always right.
+        A foreign page whose name resolves to this host sends its own name in that header (DNS
+        rebinding). The local address itself needs no name and is always accepted.
         """
         name = called.lower().rstrip(".")
         known = {"localhost", self.host.lower(), *(each.lower() for each in self.host_names)}
@@ -341,7 +340,7 @@ def _require_pair(certificate: Path, key: Path) -> None:
         with file.open("rb"):
             pass
     try:
-        # A password is given so that an encrypted key is refused, not asked for on the terminal.
+        # With a password given, OpenSSL refuses an encrypted key and does not prompt for one.
         ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER).load_cert_chain(certificate, key, password="")
     except (ssl.SSLError, ValueError) as error:
         reason = getattr(error, "reason", None) or error

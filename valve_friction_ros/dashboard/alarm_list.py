@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Alarms in words: which are listed, their rows, and what may be asked of them."""
+"""The list of alarms: its filters, its rows, and the actions on an alarm."""
 
 import asyncio
 from collections.abc import Iterable, Mapping
@@ -32,10 +32,10 @@ RANGES = {
     "1 month": 30 * DAY,
     "1 year": 366 * DAY,
 }
-"""Times before now that can be chosen, ns."""
+"""Selectable time spans before now, ns."""
 ALL = "all"
 MOST_ROWS = 500
-"""Rows of a page; the CSV has all."""
+"""Maximum number of rows on a page; the CSV has all."""
 _LONGEST_SEARCH = 200
 
 ACTIONS = {
@@ -46,7 +46,7 @@ ACTIONS = {
     AlarmAction.PUT_BACK: "Put back into service",
     AlarmAction.COMMENT: "Comment",
 }
-"""What a person may ask, as a button says it."""
+"""Actions of a person, with the labels of their buttons."""
 
 _SERVICES = {
     AlarmAction.ACKNOWLEDGE: ("acknowledge", None),
@@ -57,18 +57,18 @@ _SERVICES = {
     AlarmAction.PUT_BACK: ("out_of_service", False),
 }
 LASTING = frozenset({AlarmAction.SHELVE, AlarmAction.TAKE_OUT})
-"""What lasts for a time."""
+"""Actions that last for a set time."""
 
 
 def possible(state: str) -> tuple[AlarmAction, ...]:
-    """Return what may be asked of an alarm in a state, which is given in words."""
+    """Return the actions that an alarm allows in a state, given in words."""
     return tuple(
         one for one in ACTIONS if any(s.value == state and a is one for s, a in TRANSITIONS)
     )
 
 
 class Asked(NamedTuple):
-    """What a person asks: the action, their name and words, and for how long, h, where it lasts."""
+    """Request of a person: action, name and comment; for a lasting action also its hours."""
 
     action: AlarmAction
     who: str
@@ -77,7 +77,7 @@ class Asked(NamedTuple):
 
 
 def request_of(asked: Asked, kind: str) -> ServiceRequest:
-    """Return the call of the service by which that is asked of an alarm, or of ``all``."""
+    """Return the service call for a request on one kind of alarm, or on ``all``."""
     name, switch = _SERVICES[asked.action]
     values = {
         "alarm_kind": kind,
@@ -90,22 +90,22 @@ def request_of(asked: Asked, kind: str) -> ServiceRequest:
 
 @dataclass(frozen=True)
 class AlarmSelection:
-    """What a page of alarms lists.
+    """Filters of an alarm page.
 
     Attributes
     ----------
     is_journal : bool
-        Whether all events are listed; else the alarms that are not normal.
+        Whether to list all events; else only alarms that are not normal.
     span : str
-        Name of the time before now (`RANGES`), or ``all``.
+        Name of the time span before now (`RANGES`), or ``all``.
     search : str
-        Words; each must be in tag, name, sentence, person or text.
+        Words; each must occur in tag, name, sentence, person or text.
     area : str
-        Area of the valves, with the areas in it.
+        Area of the valves, including its sub-areas.
     states : frozenset of AlarmState
-        States that are listed; empty: all.
+        States to list; empty for all.
     kinds : frozenset of AlarmKind
-        Alarms that are listed; empty: all.
+        Kinds of alarm to list; empty for all.
     """
 
     is_journal: bool = False
@@ -117,7 +117,7 @@ class AlarmSelection:
 
     @classmethod
     def from_query(cls, query: Mapping[str, str]) -> "AlarmSelection":
-        """Read an address; what is unknown in it is left out."""
+        """Read the filters from an address; ignore unknown parts."""
         states, kinds = query.get("state", "").split(","), query.get("kind", "").split(",")
         span = query.get("span", ALL)
         return cls(
@@ -130,7 +130,7 @@ class AlarmSelection:
         )
 
     def to_query(self) -> dict[str, str]:
-        """Return what an address has to hold; nothing that is usual."""
+        """Return the parts of the address, without defaults."""
         parts = {
             "view": "events" if self.is_journal else "",
             "span": "" if self.span == ALL else self.span,
@@ -158,7 +158,7 @@ class AlarmSelection:
 
 
 def row_of(number: int, one: KeptAlarmEvent, zone: ZoneInfo, href: str, is_journal: bool) -> Any:
-    """Return a row under fixed keys; `number` tells it apart."""
+    """Return a row under fixed keys, with `number` as its identity."""
     event, alarm = one.event, one.event.alarm
     level = alarm.condition.level
     by = f"{event.action.value} by {event.who}" if event.who else event.action.value
@@ -183,7 +183,7 @@ def row_of(number: int, one: KeptAlarmEvent, zone: ZoneInfo, href: str, is_journ
 
 
 def areas_of(valves: Iterable[str]) -> tuple[str, ...]:
-    """Return the areas that names of identifiers lie in, with the areas around them, sorted."""
+    """Return the areas of identifiers, with all enclosing areas, sorted."""
     found = {"/"}
     for name in valves:
         parts = name.strip("/").split("/")[:-2]
@@ -192,24 +192,24 @@ def areas_of(valves: Iterable[str]) -> tuple[str, ...]:
 
 
 class HistoryOperator:
-    """Answers alarms in the history, of which identifiers follow the file.
+    """Answers alarms through the history; identifiers follow the history file.
 
-    An identifier that shares its process with many valves offers no services for that.
+    An identifier that shares its process with many valves offers no alarm services.
 
     Parameters
     ----------
     history : HistoryCache
         The history.
     services : Operator or None
-        Calls the services of identifiers: for all else, and for the alarms of valves that no file
-        here keeps. None: no identifier is heard.
+        Calls the services of identifiers: for all other requests, and for alarms of valves without
+        a history file here. None if no identifier is heard.
     """
 
     def __init__(self, history: HistoryCache, services: Operator | None = None) -> None:
         self._history, self._services = history, services
 
     async def call(self, node: str, request: ServiceRequest) -> Answer:
-        """Make a request on an alarm of a valve, or on all of them; or call another service."""
+        """Make a request on one or all alarms of a valve, or call another service."""
         history, called = self._history, (request.name, request.switch)
         action = next((action for action, one in _SERVICES.items() if one == called), None)
         kept = next((one for one in history.valves if one.name == node), None)

@@ -7,10 +7,10 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Charts of the pages, as options of ECharts: numbers and fixed words, never text from outside.
+"""Charts of the pages as ECharts options: numbers and fixed words, never text from outside.
 
-The times of the trend are those of a wall clock in the chosen zone, which the browser is told to
-take for UTC: it knows no other zones.
+Times of the trend are wall-clock times in the chosen zone. The chart treats them as UTC, since
+ECharts knows no other zones.
 """
 
 import math
@@ -36,14 +36,14 @@ from valve_friction_ros.streams import utc
 
 _BLUE, _ORANGE, _GREY, _GREEN = "#0072B2", "#D55E00", "#8a949f", "#009E73"
 _MOST_POINTS = 1500
-"""Most points of a line."""
+"""Maximum number of points per line."""
 _SPLIT = "rgba(128,140,152,0.22)"
 
 Options = dict[str, Any]
 
 
 def _base() -> Options:
-    """Return what all charts share."""
+    """Return the options common to all charts."""
     return {
         "animation": False,
         "useUTC": True,
@@ -70,7 +70,7 @@ def _axis(kind: str, name: str, **more: Any) -> Options:
 
 
 def _line(name: str, data: Sequence[Any], colour: str, **style: Any) -> Options:
-    """Return a line through points; `width` and `dashes` are its own, the rest the series'."""
+    """Return a line series; `width` and `dashes` style the line, other keys the series."""
     width = style.pop("width", 1.5)
     dashes = style.pop("dashes", "solid")
     return {
@@ -86,17 +86,17 @@ def _line(name: str, data: Sequence[Any], colour: str, **style: Any) -> Options:
 
 
 def _scatter(name: str, data: Sequence[Any], colour: str, **style: Any) -> Options:
-    """Return points, one by one; `style` is the series'."""
+    """Return a scatter series; `style` holds further keys of the series."""
     return {"name": name, "type": "scatter", "data": data, "itemStyle": {"color": colour}, **style}
 
 
 def _plain(value: float | None) -> float | None:
-    """Return a number as JSON can hold it, with six digits, more than a screen shows."""
+    """Return a number for JSON, with six digits, or None if not finite."""
     return None if value is None or not math.isfinite(value) else float(f"{value:.6g}")
 
 
 def live_data(pressure: Strip, stem: Strip) -> list[Options]:
-    """Return the series of the live chart: pressure in kPa and stem in mm."""
+    """Return the data series of the live chart: pressure, kPa, and stem, mm."""
     return [
         {"data": [[round(t, 3), float(f"{v * scale:.6g}")] for t, v in _pairs(strip)]}
         for strip, scale in ((pressure, 1e-3), (stem, 1e3))
@@ -108,7 +108,7 @@ def _pairs(strip: Strip) -> Iterable[tuple[float, float]]:
 
 
 def live_chart(span: float) -> Options:
-    """Return the empty chart of the last `span` seconds: the pressure over the stem."""
+    """Return the empty chart of the last `span` seconds: pressure above, stem below."""
     names = ("pressure [kPa]", "stem [mm]")
     grids = [
         {"left": 64, "right": 18, "top": 10, "height": "39%"},
@@ -131,12 +131,12 @@ def live_chart(span: float) -> Options:
 
 
 def loop_data(loop: Strip) -> list[list[float]]:
-    """Return the points of a signature, pressures (Pa) and positions (m), as kPa and mm."""
+    """Return the points of a signature in kPa and mm, from Pa and m."""
     return [[float(f"{p * 1e-3:.6g}"), float(f"{x * 1e3:.6g}")] for p, x in _pairs(loop)]
 
 
 def loop_chart(record: Recording | None) -> Options:
-    """Draw the signature of the baseline's record; that of now is filled in by `loop_data`."""
+    """Draw the signature of the baseline record; `loop_data` fills in the present signature."""
     healthy = []
     if record is not None:
         step = max(1, len(record) // _MOST_POINTS)
@@ -157,7 +157,7 @@ _LIMITS = {"warn_ratio": "#E69F00", "error_ratio": "#D55E00", "low_ratio": "#CC7
 
 
 def _wall(stamp: int, zone: ZoneInfo) -> int:
-    """Return the wall clock of a zone, ms since 1970 as if it were UTC."""
+    """Return the wall-clock time of a zone, ms since 1970 as if it were UTC."""
     offset = utc(stamp).astimezone(zone).utcoffset()
     return stamp // 1_000_000 + (0 if offset is None else round(offset.total_seconds() * 1000))
 
@@ -165,10 +165,10 @@ def _wall(stamp: int, zone: ZoneInfo) -> int:
 def trend_chart(
     history: ValveHistory, zone: ZoneInfo, now: int, events: Sequence[AlarmEvent] = ()
 ) -> Options:
-    """Draw friction over time with intervals, baseline, limits, trend and the crossing of a limit.
+    """Draw friction over time with intervals, baseline, limits, trend and expected crossing.
 
-    Of many estimates the latest are drawn. `now` is today, ns since 1970. Events of its alarms, and
-    comments, are marks at the bottom.
+    Only the latest estimates are drawn if there are many. `now` is today, ns since 1970. Alarm
+    events and comments appear as marks at the bottom.
     """
     baseline = history.entries[-1].baseline
     of = trended(baseline)
@@ -223,11 +223,11 @@ DRAG_TO_ZOOM: Options = {
     "key": "dataZoomSelect",
     "dataZoomSelectActive": True,
 }
-"""The action after which a drag over a chart chooses what is shown."""
+"""Action that makes a drag over the chart select a time range."""
 
 
 def zoom(now: int, span: int | None, zone: ZoneInfo) -> Options:
-    """Return the action that shows a time before now, ns; None: all."""
+    """Return the action that zooms to a time span before now, ns; None for all."""
     if span is None:
         return {"type": "dataZoom", "start": 0, "end": 100}
     begin, end = _wall(now - span, zone), _wall(now, zone)
@@ -244,7 +244,7 @@ _EVENTS = {
 
 
 def _level_lines(history: ValveHistory, of: str, zone: ZoneInfo) -> list[Options]:
-    """Draw baseline and limits as they were in force, without repetitions."""
+    """Draw the baseline and limits in force over time, without repetitions."""
     steps: list[tuple[int, float | None, Any]] = []
     for entry in history.entries:
         step = (_wall(entry.time, zone), friction_of(entry.baseline, of), entry.limits)

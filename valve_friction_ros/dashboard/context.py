@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""What the pages draw from: options, valves, their history and files, who is asked, who looks."""
+"""Context of the pages: options, valves, history, files, service calls and visitors."""
 
 import asyncio
 import contextlib
@@ -28,7 +28,7 @@ from valve_friction_ros.history import HistoryError, KeptValve, Place
 from valve_friction_ros.outside_text import printable
 
 INSTALL = "pip install 'nicegui>=3.18,<4'"
-"""What installs the library of the pages, which rosdep does not know."""
+"""Command that installs the web framework, which rosdep does not know."""
 
 
 def zone_of(name: str) -> ZoneInfo:
@@ -48,22 +48,22 @@ class DashboardOptions:
     Attributes
     ----------
     access : Access
-        Address that it listens at, and whom it lets in.
+        Address to listen on, and access control.
     port : int
-        Port that it listens at.
+        Port to listen on.
     history : Path or HistoryServer or None
-        The history of the valves; None: there is none.
+        The history of the valves; None without a history.
     reports, bags, alarms : Path or None
-        The folders that it serves files from; None: there are none.
+        The folders of files to serve; None without a folder.
     time_zone : str
-        Zone of the times, where the address names no other.
+        Default time zone; the address of a page can name another.
     silence : float
         Time without a message after which a valve is silent, s.
 
     Raises
     ------
     ValueError
-        If the port or the silence is impossible, or the zone unknown.
+        If port or silence is impossible, or the zone unknown.
     """
 
     access: Access = field(default_factory=Access)
@@ -85,30 +85,30 @@ class DashboardOptions:
 
     @property
     def address(self) -> str:
-        """The address to open in a browser of this machine."""
+        """The address to open in a browser on this machine."""
         host = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(self.access.host, self.access.host)  # noqa: S104
         scheme = "https" if self.access.is_encrypted else "http"
         return f"{scheme}://{f'[{host}]' if ':' in host else host}:{self.port}/"
 
 
 class Answer(NamedTuple):
-    """What a service said."""
+    """Answer of a service."""
 
     success: bool
     message: str
 
 
 class ServiceRequest(NamedTuple):
-    """A call of a service.
+    """A service call.
 
     Attributes
     ----------
     name : str
         Name of the service, without the node.
     values : mapping of str to object
-        Parameters of the identifier that hold for this call.
+        Parameters to set on the identifier for this call.
     switch : bool or None
-        What a service of std_srvs/SetBool is given; None: it takes nothing.
+        Argument of a std_srvs/SetBool service; None for a service without argument.
     """
 
     name: str
@@ -122,28 +122,28 @@ class Operator(Protocol):
     async def call(self, node: str, request: ServiceRequest) -> Answer:
         """Call a service of an identifier and wait for its answer.
 
-        Who cannot be reached is an answer without success, which says so.
+        If the identifier cannot be reached, return an unsuccessful answer that says so.
         """
         ...
 
 
 class Signals(Protocol):
-    """Subscribes to the signals of a valve while somebody looks."""
+    """Subscribes to the signals of a valve while a page shows them."""
 
     def watch(self, node: str) -> LiveStrip:
-        """Subscribe to pressure and stem of an identifier's valve, once for all who look."""
+        """Subscribe to pressure and stem of an identifier's valve, once for all visitors."""
         ...
 
     def unwatch(self, node: str) -> None:
-        """Say that one looks no more; the last one ends the subscriptions."""
+        """Release one use of the signals; the last release ends the subscriptions."""
         ...
 
 
 class NoSignals:
-    """Nothing comes of any signal."""
+    """Signals of a dashboard without ROS: none arrive."""
 
     def watch(self, _node: str) -> LiveStrip:
-        """Return a strip that stays empty."""
+        """Return an empty strip."""
         return LiveStrip(60.0)
 
     def unwatch(self, _node: str) -> None:
@@ -151,18 +151,18 @@ class NoSignals:
 
 
 class Visitors(Protocol):
-    """Knows who looks at the page whose code asks."""
+    """Knows the visitor of the page whose code is running."""
 
     def name(self) -> str:
-        """Return the name of their account; empty where none is needed."""
+        """Return the name of the visitor's account; empty if no account is needed."""
         ...
 
     def may_operate(self) -> bool:
-        """Tell whether they may call services now."""
+        """Return whether the visitor may call services now."""
         ...
 
     def log_out(self) -> None:
-        """End their session."""
+        """End the visitor's session."""
         ...
 
 
@@ -170,25 +170,25 @@ NOT_ALLOWED = "your account may not operate: log in with one that may"
 
 
 class GuardedOperator:
-    """Calls services for a visitor who may operate at the moment of the call.
+    """Calls services only for a visitor with permission to operate at that moment.
 
     Parameters
     ----------
     operator : Operator
         Calls the services.
     visitors : Visitors
-        Who asks.
+        Knows the visitor.
     log : callable
-        Takes a line for each call of somebody with an account.
+        Takes a line for each call by a visitor with an account.
     """
 
     def __init__(self, operator: Operator, visitors: Visitors, log: Callable[[str], None]) -> None:
         self._operator, self._visitors, self._log = operator, visitors, log
 
     async def call(self, node: str, request: ServiceRequest) -> Answer:
-        """Call a service of an identifier; refused to others, to whom the answer says so.
+        """Call a service of an identifier, or return a refusal without permission.
 
-        Who has logged in is the person who makes a request on an alarm, whatever the page says.
+        A request on an alarm carries the name of the logged-in account, whatever the page says.
         """
         if not self._visitors.may_operate():
             return Answer(False, NOT_ALLOWED)
@@ -201,24 +201,24 @@ class GuardedOperator:
 
 @dataclass(frozen=True)
 class DashboardContext:
-    """What a dashboard shows, and whom it asks.
+    """Data sources and services of a dashboard.
 
     Attributes
     ----------
     options : DashboardOptions
-        How it was started.
+        Options of the dashboard.
     plant : Plant
-        The valves as they were heard.
+        Live state of the valves.
     history : HistoryCache
-        Their history.
+        History of the valves.
     operator : Operator
-        Calls their services.
+        Calls the services of identifiers.
     signals : Signals
-        Hears their signals.
+        Receives the signals of valves.
     visitors : Visitors
-        Knows who looks, and who may operate.
+        Knows the visitor and the visitor's permission.
     is_live : bool
-        Whether identifiers are heard and can be asked; else the history is all there is.
+        Whether identifiers are heard and can be called; else there is only the history.
     """
 
     options: DashboardOptions
@@ -232,7 +232,7 @@ class DashboardContext:
     async def answer_alarms(
         self, alarms: Sequence[tuple[KeptValve, AlarmKind]], request: AlarmRequest
     ) -> Answer:
-        """Make a request on many alarms at once, in the history."""
+        """Make a request on many alarms at once, through the history."""
         if not self.visitors.may_operate():
             return Answer(False, NOT_ALLOWED)
         name = self.visitors.name() or request.who
@@ -249,7 +249,7 @@ _MOST_LOOKED = 20_000
 
 
 class OfferedFile(NamedTuple):
-    """A file: its folder's name and path below it, a label, its size (bytes) and time (s)."""
+    """A file: name of its folder, path below it, label, size, bytes, and time, s."""
 
     kind: str
     path: str
@@ -269,7 +269,7 @@ class ValveFiles:
     Attributes
     ----------
     folders : mapping of str to Path
-        The folders by the names that addresses use.
+        The folders by their names in addresses.
     """
 
     folders: Mapping[str, Path]
@@ -281,10 +281,10 @@ class ValveFiles:
         return cls({name: path for name, path in named.items() if path is not None})
 
     def found(self, kind: str, path: str) -> Path | None:
-        """Return a file by its folder's name and its path there.
+        """Return a file by the name of its folder and its path there.
 
-        None for what is not there, is no report and no part of a bag, or lies outside the folder,
-        also by a link.
+        Return None if the file does not exist, is neither a report nor part of a bag, or lies
+        outside the folder, even through a link.
         """
         folder = self.folders.get(kind)
         if folder is None or "\0" in path:
@@ -298,7 +298,7 @@ class ValveFiles:
         return wanted if is_inside and wanted.is_file() else None
 
     def offered(self, namespace: str) -> list[OfferedFile]:
-        """Return reports and bags of the valve of a namespace, the newest first."""
+        """Return the reports and bags of a valve by its namespace, the newest first."""
         stem = _stem(namespace)
         found: list[OfferedFile] = []
         for kind, folder in self.folders.items():
@@ -313,7 +313,7 @@ class ValveFiles:
 
     @staticmethod
     def sharing(namespace: str, others: Iterable[str]) -> tuple[str, ...]:
-        """Return the other namespaces whose files have the same names, as /a/b and /a_b have."""
+        """Return other namespaces with the same file names, such as /a_b for /a/b."""
         stem = _stem(namespace)
         found = {one for one in others if one != namespace and _stem(one) == stem}
         return tuple(sorted(found))

@@ -7,11 +7,11 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The gate before all pages, files and WebSockets: own names, own origin, a session; bounded.
+"""The gate before all pages, files and WebSockets: host name, origin, session and bounds.
 
-uvicorn bounds no connections: its time limits begin after a response, and its limit of concurrency
-counts all clients together. So its protocol is given to it with both: a request must arrive in
-time, and one client may not take all connections.
+uvicorn does not bound connections per client: its timeouts begin after a response, and its
+concurrency limit counts all clients together. The protocol here adds both: a request must arrive in
+time, and one client cannot take all connections.
 """
 
 import asyncio
@@ -37,7 +37,7 @@ from valve_friction_ros.page_template import page_environment
 _BASE = {
     "X-Content-Type-Options": "nosniff",
     "X-Frame-Options": "DENY",
-    # Not no-referrer, with which a form's own origin would be "null".
+    # Not no-referrer, which would make the origin of our own form "null".
     "Referrer-Policy": "same-origin",
     "Cross-Origin-Opener-Policy": "same-origin",
     "Cross-Origin-Resource-Policy": "same-origin",
@@ -48,27 +48,27 @@ _NO_FRAMES = "frame-ancestors 'none'; base-uri 'none'; form-action 'self'"
 
 OF_PAGES = {
     **_BASE,
-    # NiceGUI's page has scripts and styles in its text and evaluates what the server sends, so
-    # both must be allowed; nothing is loaded from, or sent to, another host.
+    # NiceGUI's page has inline scripts and styles and evaluates code from the server, so both must
+    # be allowed. Nothing is loaded from, or sent to, another host.
     "Content-Security-Policy": "default-src 'self'; "
     "script-src 'self' 'unsafe-inline' 'unsafe-eval'; style-src 'self' 'unsafe-inline'; "
     "img-src 'self' data: blob:; font-src 'self' data:; "
     f"connect-src 'self'; object-src 'none'; {_NO_FRAMES}",
 }
-"""Of the pages and their files, where they have none of their own."""
+"""Default headers of the pages and their files."""
 
 ENCRYPTED_ONLY = {"Strict-Transport-Security": "max-age=86400"}
-"""With a certificate: a browser that has been here comes by https alone for a day."""
+"""Header with a certificate: for a day, the browser then uses https only."""
 
 OF_LOG_IN = {
     **_BASE,
     "Content-Security-Policy": f"default-src 'none'; style-src 'unsafe-inline'; {_NO_FRAMES}",
 }
-"""Of the page of the log-in, which holds no script."""
+"""Headers of the log-in page, which has no script."""
 
 
 def host_of(header: str) -> str:
-    """Return the name or address in a header ``Host``; empty if there is none."""
+    """Return the name or address in a ``Host`` header; empty if there is none."""
     try:
         return urlsplit(f"//{header}").hostname or ""
     except ValueError:
@@ -76,10 +76,10 @@ def host_of(header: str) -> str:
 
 
 def is_own_origin(origin: str | None, host: str, is_encrypted: bool = False) -> bool:
-    """Tell whether a request comes from a page of the host that is asked.
+    """Return whether a request comes from a page of this host.
 
-    A browser says the origin of each WebSocket and each form; what says none is no browser. With a
-    certificate the page came by https; without one it may have too, from a proxy.
+    A browser states the origin of each WebSocket and form; a client without an origin is not a
+    browser. With a certificate the page came by https; without one it may have too, from a proxy.
     """
     if origin is None:
         return True
@@ -93,24 +93,25 @@ def is_own_origin(origin: str | None, host: str, is_encrypted: bool = False) -> 
 
 
 def own_path(text: str) -> str:
-    """Return a path of this host, or ``/`` where the text may lead to another one."""
+    """Return a path on this host, or ``/`` if the text could lead to another host."""
     is_own = text.startswith("/") and not text.startswith("//")
     return text if is_own and text.isprintable() and "\\" not in text else "/"
 
 
 ARRIVAL_TIME = 10.0
-"""Time for a request to arrive whole, s, from the connection or from its first byte."""
+"""Time for a complete request to arrive, s, from the connection or from its first byte."""
 
 MOST_OF_A_CLIENT = 256
-"""Open connections of one address. Chosen: a browser takes seven for a page and one to keep it, so
-30 may open pages at once behind one proxy; a process may open 1024 files, as a rule."""
+"""Maximum number of open connections per address. Chosen: a browser takes seven to open a page and
+one to keep it, so 30 visitors behind one proxy can open pages at once; the usual limit of a process
+is 1024 open files."""
 
 _SUMMARY = 60.0
-"""Time between two lines of the log on one client, s."""
+"""Time between two log lines on ended connections, s."""
 
 
 class ConnectionLog:
-    """Logs that connections were ended: the first at once, then a sum each minute.
+    """Logs ended connections: the first at once, then a total every minute.
 
     Parameters
     ----------
@@ -123,7 +124,7 @@ class ConnectionLog:
         self._more: Counter[tuple[str, str]] | None = None
 
     def note(self, client: str, why: str) -> None:
-        """Count that a connection of a client was ended."""
+        """Count an ended connection of a client."""
         if self._more is not None:
             self._more[client, why] += 1
             return
@@ -145,7 +146,7 @@ class ConnectionLog:
 
 
 class _Bounded(HttpToolsProtocol):
-    """uvicorn's protocol of a connection, with a time for requests and a bound for each client."""
+    """uvicorn's protocol with a timeout per request and a connection limit per client."""
 
     def __init__(self, *arguments: Any, ended: ConnectionLog, **named: Any) -> None:
         super().__init__(*arguments, **named)
@@ -156,11 +157,11 @@ class _Bounded(HttpToolsProtocol):
 
     @property
     def since(self) -> float:
-        """Time at which its request is overdue, s of the loop's clock; infinite without one."""
+        """Time when a request is overdue, s of the loop's clock; infinite if none is awaited."""
         return float("inf") if self._due is None else self._due.when()
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        """Take a connection; beyond the bound one of its client's that waits longest is ended."""
+        """Accept a connection; above the limit, end the client's longest-waiting connection."""
         super().connection_made(transport)
         self._network = network_of(_host(self))
         self._await_request()
@@ -175,7 +176,7 @@ class _Bounded(HttpToolsProtocol):
         super().connection_lost(exc)
 
     def end(self, why: str) -> None:
-        """End the connection at once, and note why."""
+        """End the connection at once, and log the reason."""
         self._has_arrived()
         self._ended.note(self._network, why)
         self.connections.discard(self)
@@ -207,7 +208,7 @@ class _Bounded(HttpToolsProtocol):
 
 
 def _host(connection: object) -> str:
-    """Return the address of the other side, of a WebSocket's protocol as well."""
+    """Return the client address of a connection, also for a WebSocket."""
     client = getattr(connection, "client", None)
     return client[0] if client else ""
 
@@ -215,40 +216,40 @@ def _host(connection: object) -> str:
 LOG_IN = "/login"
 """Path of the log-in."""
 STATE = "/login/state"
-"""Path that answers 204 in a session and 401 out of it."""
+"""Path that answers 204 with a session and 401 without."""
 
 _LONGEST_FORM = 4096
 _LONGEST_NAME = 64
 _MOST_LINES = 60
-"""Refused log-ins that are logged in a minute."""
+"""Maximum number of refused log-ins logged per minute."""
 _PATIENCE = 10.0
-"""Time for a form to arrive, s."""
+"""Timeout for a form to arrive, s."""
 
 
 def _cookie(asked: HTTPConnection, access: Access) -> str:
-    """Return the cookie's name: by the port, since the cookies of a host know none."""
+    """Return the name of the cookie; it includes the port, since cookies apply to all ports."""
     prefix = "__Host-" if access.is_encrypted else ""
     return f"{prefix}valve_friction_{asked.scope['server'][1]}"
 
 
 def token_of(asked: HTTPConnection, access: Access) -> str | None:
-    """Return the token of a session that a request holds."""
+    """Return the session token of a request."""
     return asked.cookies.get(_cookie(asked, access))
 
 
 class Gate:
-    """An ASGI application around another, which only who may see it reaches.
+    """An ASGI application that lets only authorised requests through to another.
 
     Parameters
     ----------
     app : ASGI application
         The pages.
     access : Access
-        Who may see them.
+        Access control.
     sessions : Sessions
-        Who has logged in.
+        The sessions.
     log : callable
-        Takes a line for each log-in and each refused one, of these 60 a minute at most.
+        Takes a line for each log-in and each refused one; at most 60 refusals per minute.
     """
 
     def __init__(
@@ -260,7 +261,7 @@ class Gate:
         self._page = page_environment("valve_friction_ros.dashboard").get_template("log_in.html")
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answer a request, refuse it, or let it through."""
+        """Answer, refuse or pass on a request."""
         if scope["type"] not in ("http", "websocket"):
             await self._app(scope, receive, send)
             return
@@ -281,7 +282,7 @@ class Gate:
         return self._sessions.account_of(token_of(asked, self._access))
 
     def _refusal(self, asked: HTTPConnection) -> Response | None:
-        """Refuse foreign names and foreign pages."""
+        """Refuse foreign host names and requests from foreign pages."""
         host = asked.headers.get("host", "")
         if not self._access.answers_to(host_of(host), asked.scope["server"][0]):
             words = f"no such host here: {printable(host, 100)!r}; see host_names of the dashboard"
@@ -292,7 +293,7 @@ class Gate:
         return None
 
     async def _without_session(self, asked: HTTPConnection, receive: Receive) -> Response | None:
-        """Answer the log-in, and who has no session; None where there is one."""
+        """Answer the log-in and requests without a session; return None with a session."""
         path = asked.scope["path"]
         if asked.scope["type"] == "http" and path == LOG_IN:
             if asked.scope["method"] == "POST":
@@ -311,10 +312,10 @@ class Gate:
         return HTMLResponse(page, status, OF_LOG_IN)
 
     async def _logged_in(self, request: Request) -> Response:
-        """Compare a form with the accounts."""
+        """Check a log-in form against the accounts."""
         try:
             fields = await asyncio.wait_for(_fields(request), _PATIENCE)
-        except (asyncio.TimeoutError, ValueError):  # the builtin one only since Python 3.11
+        except (asyncio.TimeoutError, ValueError):  # equals the builtin one only since Python 3.11
             return PlainTextResponse("no form of a log-in", 400, OF_LOG_IN)
         there = own_path(fields.get("next", "/"))
         address = request.client.host if request.client else ""
@@ -323,7 +324,7 @@ class Gate:
         if isinstance(found, Refusal):
             return self._refused(name, address, there, found.wait)
         self._log(f"{printable(name)} has logged in from {printable(address)}")
-        self._sessions.end(token_of(request, self._access))  # of whoever sat there before
+        self._sessions.end(token_of(request, self._access))  # any earlier session of this browser
         response = RedirectResponse(there, 303, OF_LOG_IN)
         response.set_cookie(
             _cookie(request, self._access),
@@ -336,7 +337,7 @@ class Gate:
         return response
 
     def _refused(self, name: str, address: str, there: str, wait: int) -> Response:
-        """Refuse a log-in, and log it within a bound: whoever tries may try without end."""
+        """Refuse a log-in, and log it at a limited rate, since attempts may never end."""
         if self._lines.wait("") <= 0:
             self._lines.count("")
             why = "too many attempts" if wait > 0 else "wrong name or password"
@@ -354,7 +355,7 @@ class Gate:
             return
 
         async def receive_in_session() -> Message:
-            """Close a WebSocket whose session has ended, at its next message (or pong)."""
+            """Close a WebSocket at its next message or pong once its session has ended."""
             message = await receive()
             if self._access.accounts and self._account(asked) is None:
                 return {"type": "websocket.disconnect", "code": 1008}
@@ -375,7 +376,7 @@ def _with_headers(send: Send, more: Mapping[str, str]) -> Send:
 
 
 async def _fields(request: Request) -> dict[str, str]:
-    """Return the fields of a form; raises ValueError if it is too long or none."""
+    """Return the fields of a form; raises ValueError if it is too long or invalid."""
     body = b""
     async for part in request.stream():
         body += part
@@ -391,18 +392,20 @@ setInterval(async () => {{
   if (answer && answer.status === 401) location.reload();
 }}, 15000);
 </script>"""
-"""Leads to the log-in when the session has ended: NiceGUI's page would reconnect for ever."""
+"""Script that returns to the log-in when the session has ended.
+
+Without it NiceGUI's page would try to reconnect for ever."""
 
 
 class Guard:
-    """Says who asks, in a page and in its handlers.
+    """Identifies the visitor in a page and in its handlers.
 
     Parameters
     ----------
     access : Access
-        Who may see and operate.
+        Access control.
     sessions : Sessions
-        Who has logged in.
+        The sessions.
     """
 
     def __init__(self, access: Access, sessions: Sessions) -> None:
@@ -412,47 +415,47 @@ class Guard:
         return token_of(context.client.request, self._access)
 
     def visitor(self) -> Account | None:
-        """Return the account whose page this is; None where its session has ended.
+        """Return the account of this page, or None if its session has ended.
 
-        To be asked in a page's own code: while it is drawn, or in a handler of one of its events.
+        Call this only in the code of a page: while it is drawn, or in one of its event handlers.
         """
         try:
             return self._sessions.account_of(self._token())
-        except RuntimeError:  # NiceGUI's, where there is no page
+        except RuntimeError:  # raised by NiceGUI outside a page
             return None
 
     def name(self) -> str:
-        """Return the name of the account whose page this is; empty where there is none."""
+        """Return the name of the account of this page; empty without an account."""
         return visitor.name if (visitor := self.visitor()) else ""
 
     def may_operate(self) -> bool:
-        """Tell whether services of identifiers may be called for this page now."""
+        """Return whether this page may call services of identifiers now."""
         if not self._access.accounts:
             return True
         visitor = self.visitor()
         return visitor is not None and visitor.role is Role.OPERATE
 
     def log_out(self) -> None:
-        """End the session of this page, and of all others that have the same."""
+        """End the session of this page and of all other pages that share it."""
         self._sessions.end(self._token())
         ui.navigate.to(LOG_IN)
 
 
 def guard(app: App, access: Access, log: Callable[[str], None]) -> Guard:
-    """Put the gate before an application; to be called once, before it runs.
+    """Put the gate before an application; call this once, before the application runs.
 
-    `log` takes a line for each log-in and each wrong one.
+    `log` takes a line for each log-in and each refused one.
 
     Raises
     ------
     ValueError, OSError
-        If the file of sessions cannot be used.
+        If the session file cannot be used.
     """
     sessions = Sessions(
         access.accounts, access.session_hours * 3600.0, time.time, access.session_file, log
     )
     build = app.build_middleware_stack
-    # The gate is outside all of the stack, also of what is added later.
+    # The gate surrounds the whole stack, including middleware added later.
     app.build_middleware_stack = lambda: Gate(build(), access, sessions, log)  # type: ignore[method-assign]
 
     def is_own(origin: str | None, request: dict[str, Any]) -> bool:
@@ -465,13 +468,13 @@ def guard(app: App, access: Access, log: Callable[[str], None]) -> Guard:
 
 
 def server_options(access: Access, log: Callable[[str], None]) -> dict[str, Any]:
-    """Return what `ui.run` needs to know of the access.
+    """Return the access options for `ui.run`.
 
-    `log` takes the lines on connections that were ended.
+    `log` takes the lines on ended connections.
     """
     options: dict[str, Any] = {
         "host": access.host,
-        # Else a header of the request would say its address, by which attempts are counted.
+        # With proxy headers a request could forge its address, by which attempts are counted.
         "proxy_headers": False,
         "server_header": False,
         "http": partial(_Bounded, ended=ConnectionLog(log)),

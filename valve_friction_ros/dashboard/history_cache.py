@@ -7,9 +7,9 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The history as the pages read it: in a thread, and again only when the file has changed.
+"""The history for the pages, read in a thread and only when the file has changed.
 
-It can also tell a plant of its valves, where no identifier is heard.
+Where no identifier is heard, it also supplies a plant with its valves.
 """
 
 import json
@@ -63,7 +63,7 @@ _TOP, _BOTTOM = 2.0, 22.0
 
 
 class Sparkline(NamedTuple):
-    """Paths of an SVG: the ratios over time, and a line at 1; and the days that they span."""
+    """SVG paths of the ratios over time and of a line at 1, with the number of days."""
 
     path: str
     base: str
@@ -71,10 +71,10 @@ class Sparkline(NamedTuple):
 
 
 def sparkline(times: Sequence[int], ratios: Sequence[float]) -> Sparkline | None:
-    """Draw ratios over their times, ns; None for fewer than two of them.
+    """Draw ratios over their times, ns; return None for fewer than two ratios.
 
-    The height is logarithmic and spans a factor of 1.6 at least, so that noise looks small. Many
-    points are combined to `_SPARK_POINTS` by the median.
+    The height is logarithmic and spans at least a factor of 1.6, so that noise looks small. Medians
+    reduce many points to `_SPARK_POINTS`.
     """
     found = sorted((t, math.log(r)) for t, r in zip(times, ratios, strict=True) if 0 < r < math.inf)
     if len(found) < 2:
@@ -102,26 +102,26 @@ def sparkline(times: Sequence[int], ratios: Sequence[float]) -> Sparkline | None
 
 _SPARK_DAYS = 400
 _MOST_RATIOS = 800
-"""Ratios of a valve that its sparkline is drawn from."""
+"""Maximum number of ratios in the sparkline of a valve."""
 _READ_DEPTH = 1100 * DAY
-"""Time, ns, of a valve's history that is read at most."""
+"""Maximum time span, ns, to read of the history of a valve."""
 _MOST_CACHED = 8
-"""Valves whose histories are kept in memory."""
+"""Number of valves whose histories are kept in memory."""
 _SERVER_PAUSE = 2.0
-"""Time, s, between two questions to a server."""
+"""Minimum time between two queries to a server, s."""
 
 
 class HistoryCache:
-    """What the history file says of all valves and of each.
+    """Cached contents of the history, for all valves and per valve.
 
-    `refresh` and `valve` read the file, so they are called in a thread of their own; all else
-    returns at once. What cannot be read is a `problem`, and what was read before stays. A server
-    may keep one waiting: `refresh` asks it in another thread, and does not wait.
+    `refresh` and `valve` read the file, so call them in a worker thread; the cached contents are
+    available at once. A read error becomes the `problem`, and earlier contents remain. A server may
+    be slow: `refresh` queries it in another thread and does not wait.
 
     Parameters
     ----------
     place : Path or HistoryServer or None
-        The history; None: there is none.
+        The history; None without a history.
     """
 
     def __init__(self, place: Place | None) -> None:
@@ -146,9 +146,9 @@ class HistoryCache:
         self.alarm_revision = 0
 
     def refresh(self) -> bool:
-        """Read what is new, if the file has changed; return whether it has.
+        """Read new rows if the file has changed, and return whether it has.
 
-        A server is asked, and what it answers is there later.
+        For a server, start a query; its answer arrives later.
         """
         if self._file is None or self._path is not None:
             return self._refresh()
@@ -183,19 +183,19 @@ class HistoryCache:
             for one in found:
                 self._ratios[one.valve].append(one)
             self._rows.update(one.row for one in found)
-            if mark.settled:  # no row comes any more before the last one
+            if mark.settled:  # no new row can precede the last one
                 self._row = max(self._row, mark.identification)
                 self._rows = {row for row in self._rows if row > self._row}
             for valve in {one.valve for one in found}:
                 ratios = list(self._ratios[valve])
                 self._sparks[valve] = sparkline([r.time for r in ratios], [r.ratio for r in ratios])
             self._histories.clear()
-            self.valves = valves  # last, as others look meanwhile: all else is there with them
+            self.valves = valves  # last: other threads must find the rest complete
             self.revision += 1
             return True
 
     def _may_be_new(self) -> bool:
-        """Tell whether there may be new rows; where another file stands now, they count from 1."""
+        """Return whether there may be new rows; start again if the file has been replaced."""
         if self._path is None:
             return True
         if (state := file_state(self._path)) == self._seen:
@@ -215,7 +215,7 @@ class HistoryCache:
     def alarms(
         self, chosen: AlarmFilter, is_journal: bool, most: int = 100_000
     ) -> tuple[KeptAlarmEvent, ...]:
-        """Read events of alarms, or the last one of each alarm that stands, the newest first.
+        """Read all alarm events, or the last event of each alarm not normal, the newest first.
 
         Raises HistoryError if the history cannot be read.
         """
@@ -227,22 +227,22 @@ class HistoryCache:
 
     @property
     def is_file(self) -> bool:
-        """Whether it is a file, which identifiers of this machine follow."""
+        """Whether the history is a file, which identifiers on this machine follow."""
         return self._path is not None
 
     def answer(self, alarms: Sequence[tuple[KeptValve, AlarmKind]], request: AlarmRequest) -> int:
-        """Make a request on many alarms; return of how many it was kept.
+        """Make a request on many alarms; return the number of alarms that accepted it.
 
-        Raises HistoryError if there is no history, or it cannot be written.
+        Raises HistoryError if there is no history or it cannot be written.
         """
         return database.request_many(self._written(), alarms, request, time.time_ns())
 
     def answer_valve(
         self, valve: KeptValve, kind: AlarmKind | None, request: AlarmRequest
     ) -> tuple[Alarm, ...]:
-        """Make a request on one alarm of a valve, or on all; return them as they are.
+        """Make a request on one alarm or all alarms of a valve; return the updated alarms.
 
-        Raises AlarmError if that is not possible now, and HistoryError as `answer` does.
+        Raises AlarmError if the request is not possible now, and HistoryError like `answer`.
         """
         steps = database.request_alarms(self._written(), valve, kind, request, time.time_ns())
         return tuple(one.alarm for one in steps.events)
@@ -253,11 +253,11 @@ class HistoryCache:
         return self._file
 
     def spark(self, node: str) -> Sparkline | None:
-        """Return the picture of a valve's ratios, if there are some."""
+        """Return the sparkline of a valve, or None."""
         return self._sparks.get(node)
 
     def valve(self, node: str) -> ValveHistory | None:
-        """Read the history of a valve; None if nothing is kept of it.
+        """Read the history of a valve; return None if it has no history.
 
         Raises HistoryError if the file cannot be read.
         """
@@ -278,10 +278,9 @@ _FOREVER = 2**63 - 1
 
 
 def _status_of(kept: ValveHistory) -> Status:
-    """Return what is known of a valve as its identifier would say it, but for its alarms.
+    """Return the status of a valve as its identifier would publish it, without alarms.
 
-    The last identification that was no refusal gives the numbers, and the last baseline what they
-    are compared with.
+    The numbers come from the last successful identification, the comparison from the last baseline.
     """
     last = kept.entries[-1]
     found = next((one for one in reversed(kept.entries) if not one.refusal), None)
@@ -311,7 +310,7 @@ def _status_of(kept: ValveHistory) -> Status:
 
 
 def _with_alarms(status: Status, alarms: Mapping[AlarmKind, Alarm]) -> Status:
-    """Return the status with its alarms; one of the whole valve that is told raises the level."""
+    """Return the status with its alarms; an active whole-valve alarm can raise the level."""
     level, told = status.level, [status.message]
     values = {**status.values, **alarm_values(alarms)}
     for one in alarms.values():
@@ -324,14 +323,14 @@ def _with_alarms(status: Status, alarms: Mapping[AlarmKind, Alarm]) -> Status:
 
 
 class KeptValves(HistoryCache):
-    """A history that tells a plant of its valves, as their identifiers would.
+    """A history that supplies a plant with statuses, in place of identifiers.
 
     Parameters
     ----------
     place : Path or HistoryServer
         The history.
     plant : Plant
-        Whom it tells.
+        Receiver of the statuses.
     """
 
     def __init__(self, place: Place, plant: Plant) -> None:
@@ -354,7 +353,7 @@ class KeptValves(HistoryCache):
         return is_new
 
     def _tell(self) -> None:
-        """Tell of all valves; the step of an alarm has none of their histories read again."""
+        """Pass on the statuses of all valves; an alarm event alone rereads no histories."""
         now = time.monotonic()
         self._plant.expect(self.valves)
         mark = None if self._mark is None else self._mark._replace(alarm_event=0)
