@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The live state of a plant's valves: what their statuses say, as the pages show it."""
+"""The live state of a plant's valves, read from their statuses for the pages."""
 
 import itertools
 import math
@@ -35,7 +35,7 @@ _LONGEST_TEXT = 400
 
 
 class Entry(NamedTuple):
-    """One value as text: its name in words, the value, and its unit where it has one."""
+    """A value as text: name in words, value, and unit if it has one."""
 
     name: str
     text: str
@@ -48,13 +48,13 @@ class Quantity(NamedTuple):
     Attributes
     ----------
     name : str
-        What it is, as in the keys.
+        Name of the number, as in the keys.
     value, half_width : float
-        The number, and half the width of its 95 % interval, in `unit`; nan where unknown.
+        The number, and half the width of its 95 % interval, in `unit`; nan if unknown.
     unit : str
-        Its unit; empty for a pure number.
+        Unit; empty for a pure number.
     verdict, reason : str
-        Whether the record determines it, and why not; empty where nothing is said.
+        Whether the record determines the number, and if not, why; empty if not stated.
     """
 
     name: str
@@ -71,14 +71,14 @@ class Quantity(NamedTuple):
 
     @property
     def if_determined(self) -> "Quantity":
-        """The same, without value and width where the record does not determine it."""
+        """The same quantity, without value and width if the record does not determine it."""
         if self.verdict != "not identifiable":
             return self
         return self._replace(value=math.nan, half_width=math.nan)
 
 
 def number(text: str | None) -> float:
-    """Read a number; nan for a text that is none."""
+    """Read a number; return nan for any other text."""
     try:
         return math.nan if text is None else float(text)
     except ValueError:
@@ -90,7 +90,7 @@ def _text(values: Mapping[str, str], key: str, longest: int = _LONGEST_TEXT) -> 
 
 
 def _quantity(values: Mapping[str, str], name: str, unit: str) -> Quantity:
-    """Return the number of this name and unit with what else is said of it."""
+    """Return the quantity of this name and unit, with half width, verdict and reason."""
     bracket = f" [{unit}]" if unit else ""
     return Quantity(
         name,
@@ -129,11 +129,11 @@ _STARTS = {
     "fit": ("fit", "rms", "systematic", "method", "derivative", "threshold", "samples", "sigma",
             "r_squared", "fixed", "warnings", "sliding_speed"),
 }  # fmt: skip
-"""Beginnings of the keys of each group; the first that fits counts."""
+"""Key prefixes of each group; the first match decides."""
 
 
 def _with_intervals(changes: tuple[Entry, ...]) -> tuple[Entry, ...]:
-    """Write each change since the baseline with its interval, rounded to it, in one entry."""
+    """Write each change since the baseline in one entry, rounded to its interval."""
     numbers = {one.name: number(one.text) for one in changes}
     found = []
     for name, text, unit in changes:
@@ -149,7 +149,7 @@ def _with_intervals(changes: tuple[Entry, ...]) -> tuple[Entry, ...]:
 
 
 def _group(key: str, shown: tuple[str, ...]) -> str:
-    """Return the group of a key; empty for one that is shown by itself."""
+    """Return the group of a key; empty if the page shows the key elsewhere."""
     if f"{_CHANGE} " in key and not key.startswith("evidence "):
         return "changes"
     if key.startswith(shown):
@@ -159,7 +159,7 @@ def _group(key: str, shown: tuple[str, ...]) -> str:
 
 
 class Status(NamedTuple):
-    """A diagnostic status as it was heard: the fields of diagnostic_msgs/DiagnosticStatus."""
+    """A diagnostic status as received: the fields of diagnostic_msgs/DiagnosticStatus."""
 
     name: str
     level: int
@@ -169,17 +169,17 @@ class Status(NamedTuple):
 
 
 class Unread(NamedTuple):
-    """A status that is read when somebody looks.
+    """A received status that is decoded only when a page needs it.
 
     Attributes
     ----------
     name : str
-        Its name.
+        Name of the status.
     read : callable
-        Returns the status; raises ValueError if it is none.
+        Returns the status; raises ValueError if the bytes are invalid.
     mark : callable or None
-        Returns what is the same as long as nothing but ages and counters changes; raises ValueError
-        if the bytes are no status. None: it has to be read.
+        Returns a mark that changes only if more than ages and counters change; raises ValueError if
+        the bytes are invalid. None: the status must be read.
     """
 
     name: str
@@ -188,7 +188,7 @@ class Unread(NamedTuple):
 
 
 class Expected(NamedTuple):
-    """The limit that a drift is expected to cross, and the dates of that (ISO 8601)."""
+    """The limit that a drift is expected to cross, with dates (ISO 8601)."""
 
     limit: str
     date: str
@@ -197,7 +197,7 @@ class Expected(NamedTuple):
 
 
 class Sources(NamedTuple):
-    """Where the samples of a valve come from; empty names where that is unknown."""
+    """Sources of the samples of a valve; empty names if unknown."""
 
     pressure_topic: str = ""
     stem_topic: str = ""
@@ -205,7 +205,7 @@ class Sources(NamedTuple):
 
 
 class Drift(NamedTuple):
-    """Drift of the friction, N a month, half its interval's width, and the limit ahead, if any."""
+    """Drift of the friction, N per month, with half width and the limit ahead, if any."""
 
     value: float
     half_width: float
@@ -214,18 +214,18 @@ class Drift(NamedTuple):
 
 
 class ValveAlarm(NamedTuple):
-    """An alarm of a valve that is not normal, as its identifier says.
+    """An alarm of a valve that is not normal, as published by its identifier.
 
     Attributes
     ----------
     kind, state : str
         Name of the alarm, and its state in words.
     level : str
-        ``OK``, ``WARN`` or ``ERROR``: what the valve shows of it.
+        Level of its condition: ``OK``, ``WARN`` or ``ERROR``.
     message : str
-        The sentence of its condition.
+        Sentence on its condition.
     until : str
-        End of shelving, or of the time out of service; empty: neither.
+        End of shelving or of the time out of service; empty if neither applies.
     """
 
     kind: str
@@ -236,43 +236,43 @@ class ValveAlarm(NamedTuple):
 
     @property
     def is_told(self) -> bool:
-        """Whether the valve shows it, and nobody has shelved it."""
+        """Whether the alarm is active and not suppressed."""
         return self.level != "OK" and not self.until
 
     @property
     def advice(self) -> str:
-        """What to do about it."""
+        """Advice on the alarm."""
         return alarm_advice(self.kind, self.level)
 
 
 @dataclass(frozen=True)
 class ValveView:
-    """What a dashboard shows of one valve.
+    """The state of one valve as a dashboard shows it.
 
     Attributes
     ----------
     node : str
-        The fully qualified name of its identifier, which tells valves apart.
+        Fully qualified name of the identifier, unique per valve.
     tag : str
-        Its tag in the plant.
+        Tag of the valve in the plant.
     level : Level or None
-        Severity; None where nothing is known.
+        Severity; None if unknown.
     signal : StatusSignal
-        The severity by NAMUR NE 107.
+        Status signal of NAMUR NE 107.
     sentence : str
         The diagnosis in words.
     reason : str
-        Why there is no estimate; empty where there is one.
+        Why there is no estimate; empty with an estimate.
     identified : int or None
-        When the estimate was made, ns since 1970 (UTC).
+        Time of the estimate, ns since 1970 (UTC).
     ratio : Ratio or None
-        Friction over that of the baseline.
+        Friction over baseline.
     dead_band : Quantity
         Dead band of the stem, % of the travel.
     parameters : tuple of Quantity
         The identified parameters.
     baseline : tuple of Quantity
-        Frictions of the baseline; empty without one.
+        Frictions of the baseline; empty without a baseline.
     drift : Drift or None
         A significant drift.
     sources : Sources
@@ -280,11 +280,11 @@ class ValveView:
     alarms : tuple of ValveAlarm
         Its alarms that are not normal.
     lacks : tuple of BaselineLack
-        Conditions of a baseline that are not met now.
+        Conditions of a baseline that the valve does not meet now.
     survey : str
-        What a first survey says of it: good, watch or bad; empty: nothing.
+        Result of the first survey: good, watch or bad; empty without a result.
     values : mapping of str to str
-        All values, as they were heard.
+        All values as received.
     """
 
     node: str
@@ -311,7 +311,7 @@ class ValveView:
         return self.node.rpartition("/")[0] or "/"
 
     def groups(self) -> dict[str, tuple[Entry, ...]]:
-        """Return the values that have no place of their own, by what they are about.
+        """Return the remaining values by subject.
 
         The groups are ``changes``, ``fit``, ``evidence``, ``usage``, ``command`` and
         ``counters``.
@@ -326,22 +326,21 @@ class ValveView:
         return groups | {"evidence": tuple(bare), "changes": _with_intervals(groups["changes"])}
 
     def parameter(self, name: str) -> Quantity:
-        """Return a parameter, without a value where it is not there."""
+        """Return a parameter, without a value if it is missing."""
         found = (one for one in self.parameters if one.name == name)
         return next(found, Quantity(name, math.nan))
 
     @property
     def advice(self) -> str:
-        """What to do about the most severe alarm that is told; empty without any."""
+        """Advice on the most severe active alarm; empty without an alarm."""
         told = [one for one in self.alarms if one.is_told]
         return max(told, key=lambda one: one.level == "ERROR").advice if told else ""
 
     @property
     def friction(self) -> Quantity:
-        """The friction that the ratio is of.
+        """The friction that was compared with the baseline.
 
-        Without a ratio the Coulomb friction, or the sliding friction where the record determines
-        that alone.
+        Without a ratio, the Coulomb friction, or the sliding friction if only that is determined.
         """
         compared = "" if self.ratio is None else self.ratio.of
         names = sorted(("coulomb_friction", "sliding_friction"), key=lambda one: one != compared)
@@ -350,7 +349,7 @@ class ValveView:
 
     @property
     def healthy(self) -> Quantity:
-        """The same friction of the baseline, without a value where it has none."""
+        """The same friction of the baseline, without a value if the baseline lacks it."""
         name = self.friction.name
         found = (one for one in self.baseline if one.name == name)
         return next(found, Quantity(name, math.nan))
@@ -363,7 +362,7 @@ _LONGEST_SENTENCE = 2000
 
 
 def identifier_in(name: str) -> str | None:
-    """Return the identifier that a status of this name is of; None for another one's status."""
+    """Return the identifier from the name of its status; None for the status of another node."""
     node = name.removesuffix(_SUFFIX)
     return node if node != name and node.startswith("/") and len(node) < 256 else None
 
@@ -393,14 +392,14 @@ ESSENTIAL_KEYS = (
     *_SOURCES,
     *(f"{name}{end}" for name in _ALARMS for end in ("", " level", " until [time]")),
 )
-"""Keys of what tells two views of a valve apart, without their counters and ages."""
+"""Keys whose values distinguish two views of a valve, without counters and ages."""
 
 _SIGNALS = {one.value: one for one in StatusSignal}
 _LEVELS = {one.value: one for one in Level}
 
 
 def view_of(node: str, status: Status) -> ValveView:
-    """Read the status of an identifier; what is wrong in it is left out."""
+    """Read the status of an identifier, ignoring invalid values."""
     values = status.values
     return ValveView(
         node=node,
@@ -438,7 +437,7 @@ def _alarms(values: Mapping[str, str]) -> tuple[ValveAlarm, ...]:
 
 
 def _lacks(values: Mapping[str, str]) -> tuple[BaselineLack, ...]:
-    """Read what is missing to a baseline; an identifier of before lacks a result at most."""
+    """Read what a baseline lacks; older identifiers report at most a missing result."""
     if "baseline_possible" not in values:
         names = ("coulomb_friction [N]", "sliding_friction [N]")
         is_known = any(math.isfinite(number(values.get(name))) for name in names)
@@ -503,30 +502,30 @@ def _drift(values: Mapping[str, str]) -> Drift | None:
 
 
 MOST_VALVES = 5000
-"""Most valves that are kept: the names come from outside, and might never end."""
+"""Maximum number of valves: names come from outside, and their number has no bound."""
 
 _FORGETTING = 3600.0
-"""Silence, s, after which a valve is forgotten that the history does not keep."""
+"""Silence, s, after which a valve is dropped if the history does not hold it."""
 _TIDYING = 60.0
-"""Time between two looks for valves to forget, s."""
+"""Time between two searches for valves to drop, s."""
 
 
 @dataclass(frozen=True)
 class Heard:
-    """A valve, and how long ago it was heard.
+    """A valve and the age of its last message.
 
     Attributes
     ----------
     number : int
         Number of the valve in this run of the dashboard.
     view : ValveView
-        What is known of it.
+        State of the valve.
     silent_for : float or None
-        Time since its last message, s; None where it has never been heard.
+        Time since its last message, s; None before the first message.
     is_silent : bool
-        Whether that is too long.
+        Whether that time is too long.
     revision : int
-        Grows with each change of what a table shows of the valve.
+        Count that grows with each change of the valve's row in a table.
     """
 
     number: int
@@ -537,7 +536,7 @@ class Heard:
 
 
 class _Valve:
-    """The newest status of a valve; its view is made when somebody looks."""
+    """The newest status of a valve; its view is made on demand."""
 
     def __init__(self, number: int, view: ValveView) -> None:
         self.number = number
@@ -551,9 +550,9 @@ class _Valve:
         self._read: Unread | None = None
 
     def look(self, node: str, with_values: bool) -> None:
-        """Read what came last; without its values where nothing else can have changed.
+        """Read the latest status; without its values if nothing else can have changed.
 
-        What is no status changes nothing.
+        An invalid status changes nothing.
         """
         latest = self.latest
         if latest is None or latest is self._read:
@@ -567,7 +566,7 @@ class _Valve:
             self.latest = None
             return
         self._mark = mark
-        # The parameters are those of the estimate's time.
+        # Parameters change only with the time of the estimate.
         essence = (*status[1:4], *map(status.values.get, ESSENTIAL_KEYS))
         if essence != self._essence:
             self.view, self._essence = view_of(node, status), essence
@@ -577,14 +576,14 @@ class _Valve:
 
 
 class Plant:
-    """What is known of each valve, behind a lock: any thread may write and read.
+    """The state of each valve, behind a lock: any thread may write and read.
 
-    A page never draws in a callback of ROS: it takes `valves` in a timer of its own.
+    A page never draws in a ROS callback: it reads `valves` in its own timer.
 
     Parameters
     ----------
     silence : float
-        Time without a message, s, after which a valve counts as silent.
+        Time without a message, s, after which a valve is silent.
     """
 
     def __init__(self, silence: float) -> None:
@@ -595,9 +594,9 @@ class Plant:
         self._tidied = -math.inf
 
     def hear(self, status: Unread, at: float) -> None:
-        """Take a status that came at a time, s of the monotonic clock.
+        """Take a status received at a time, s of the monotonic clock.
 
-        It is read when somebody looks. That of another node than an identifier is ignored.
+        It is decoded on demand. A status of any node but an identifier is ignored.
         """
         node = identifier_in(status.name)
         if node is None:
@@ -608,9 +607,9 @@ class Plant:
                 valve.at, valve.latest = at, status
 
     def expect(self, valves: Iterable[tuple[str, str]]) -> None:
-        """Show valves, (identifier, tag) each, that the history keeps, also before they are heard.
+        """Show the valves of the history, as (identifier, tag), even before they are heard.
 
-        They are never forgotten.
+        They are never dropped.
         """
         with self._lock:
             for node, tag in valves:
@@ -618,7 +617,7 @@ class Plant:
                     valve.is_kept = True
 
     def _tidy(self, now: float) -> None:
-        """Forget the valves that nothing keeps and that have been silent for long."""
+        """Drop valves that the history does not hold and that have long been silent."""
         if now < self._tidied + _TIDYING:
             return
         self._tidied = now
@@ -631,7 +630,7 @@ class Plant:
             del self._valves[node]
 
     def _entry(self, node: str, tag: str) -> _Valve | None:
-        """Return a valve, which is added where there is room for it."""
+        """Return a valve, adding it if there is room."""
         valve = self._valves.get(node)
         if valve is None and len(self._valves) < MOST_VALVES:
             view = view_of(node, Status("", 3, tag, "", {}))
@@ -639,9 +638,9 @@ class Plant:
         return valve
 
     def valves(self, now: float) -> list[Heard]:
-        """Return all valves as they are at a time, s of the monotonic clock, in a fixed order.
+        """Return all valves at a time, s of the monotonic clock, in a fixed order.
 
-        Their views are without `values`.
+        Their views have no `values`.
         """
         with self._lock:
             self._tidy(now)

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The last seconds of two signals, thinned to what a screen can show."""
+"""The last seconds of two signals, thinned to the resolution of a screen."""
 
 import threading
 import time
@@ -18,23 +18,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 _STILL = 2.0
-"""Time without a sample, s, from which the axis goes on without any."""
+"""Time without a sample, s, after which the axis moves on by itself."""
 
 _Floats = NDArray[np.float64]
 
 
 class Strip(NamedTuple):
-    """A signal as it is drawn: times (s before now) and values."""
+    """A signal to draw: times, s before now, and values."""
 
     times: _Floats
     values: _Floats
 
 
 def envelope(times: _Floats, values: _Floats, columns: int, span: float) -> Strip:
-    """Return the lowest and the highest sample of each column of pixels, in the order of time.
+    """Return the lowest and highest sample per column of pixels, in order of time.
 
-    The columns share the last `span` seconds before time 0. A signal with fewer than two samples
-    a column is returned whole. Nothing that a screen of this width would show is lost.
+    The columns divide the last `span` seconds before time 0. A signal with at most two samples per
+    column is returned whole. A screen of this width shows no difference.
     """
     inside = times >= -span
     times, values = times[inside], values[inside]
@@ -49,7 +49,7 @@ def envelope(times: _Floats, values: _Floats, columns: int, span: float) -> Stri
 
 
 class _Samples:
-    """The newest samples of a signal, in arrays with room at their end."""
+    """The newest samples of a signal, in arrays with room at the end."""
 
     def __init__(self, most: int) -> None:
         self._most = most
@@ -59,19 +59,19 @@ class _Samples:
 
     @property
     def stamps(self) -> NDArray[np.int64]:
-        """The stamps, ns, until the next change."""
+        """The stamps, ns; valid until the next change."""
         return self._stamps[self._begin : self._end]
 
     @property
     def values(self) -> _Floats:
-        """The values, until the next change."""
+        """The values; valid until the next change."""
         return self._values[self._begin : self._end]
 
     def clear(self) -> None:
         self._begin = self._end = 0
 
     def add(self, stamps: NDArray[np.int64], values: _Floats, span: int) -> None:
-        """Add samples, and leave out what is `span` ns older than the newest."""
+        """Add samples, and drop those more than `span` ns older than the newest."""
         stamps, values = stamps[-self._most :], values[-self._most :]
         if self._end + stamps.size > self._stamps.size:
             self._make_room(stamps.size)
@@ -96,16 +96,16 @@ class LiveStrip:
     Parameters
     ----------
     span : float
-        Seconds that are kept.
+        Time span to keep, s.
     most : int, optional
-        Most samples of a signal that are kept.
+        Maximum number of samples to keep per signal.
     clock : callable, optional
         Returns the time of arrival, s.
 
     Attributes
     ----------
     trouble : str
-        Why nothing can come; empty if nothing is known to be wrong.
+        Why no samples can arrive; empty if no fault is known.
     """
 
     def __init__(
@@ -120,9 +120,9 @@ class LiveStrip:
         self._count = 0
 
     def add(self, signal: int, stamps: NDArray[np.int64], values: _Floats) -> None:
-        """Add samples: of the pressure (0), Pa, or of the stem (1), m; the stamps are ns.
+        """Add samples of pressure (0), Pa, or stem (1), m, with stamps in ns.
 
-        A stamp that goes back, as when a bag begins again, empties the signal.
+        A stamp that goes back, as when a bag restarts, clears the signal.
         """
         if not stamps.size:
             return
@@ -136,17 +136,17 @@ class LiveStrip:
 
     @property
     def revision(self) -> tuple[int, int]:
-        """Grows with each arrival, and each second in which the axis goes on without any."""
+        """Revision that changes with each arrival, and each second while the axis moves alone."""
         still = self._still()
         return self._count, int(min(still, self.span + 1.0)) if still > _STILL else 0
 
     def _still(self) -> float:
-        """Return the time since the last sample of either signal, s; 0 where there was none."""
+        """Return the time since the last sample of either signal, s; 0 before the first."""
         known = [one for one in self._arrivals if one is not None]
         return max(0.0, self._clock() - max(known)) if known else 0.0
 
     def note(self) -> str:
-        """Say what does not come; empty while both signals do."""
+        """Return which signal is missing; empty while both arrive."""
         if self.trouble:
             return self.trouble
         pressure, stem = self._arrivals
@@ -166,9 +166,9 @@ class LiveStrip:
             return tuple((one.stamps.copy(), one.values.copy()) for one in self._signals)
 
     def strips(self, columns: int) -> tuple[Strip, Strip]:
-        """Return pressure and stem, each with two points a column of pixels at most.
+        """Return pressure and stem, each with at most two points per column of pixels.
 
-        The newest sample of both is at 0 s while samples come; then it goes to the left.
+        The newest sample is at 0 s while samples arrive, and then moves to the left.
         """
         signals = self._copies()
         newest = max((int(stamps[-1]) for stamps, _ in signals if stamps.size), default=0)
@@ -181,7 +181,7 @@ class LiveStrip:
         return pressure, stem
 
     def loop(self, most: int) -> Strip:
-        """Return the stem over the pressure: at most `most` samples, as (pressure, position)."""
+        """Return stem over pressure with at most `most` samples, as (pressure, position)."""
         (stamps, pressures), (times, positions) = self._copies()
         if stamps.size < 2 or times.size < 2:
             return Strip(np.empty(0), np.empty(0))

@@ -7,9 +7,9 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The log-in: a name and a password against the accounts, at a bounded rate; and sessions.
+"""Log-in by name and password at a limited rate, and sessions.
 
-Who has logged in is known by a random token in a cookie.
+A random token in a cookie identifies the session.
 """
 
 import asyncio
@@ -32,16 +32,16 @@ _MOST_KEYS = 10_000
 
 
 class AttemptLimit:
-    """Counts the attempts of each key, such as an address, within a sliding time.
+    """Limits the attempts per key, such as an address, within a sliding period.
 
-    The keys that have tried least recently are forgotten above 10,000.
+    Above 10,000 keys, those with the oldest attempts are forgotten.
 
     Parameters
     ----------
     most : int
-        Attempts within `period`.
+        Maximum number of attempts within `period`.
     period : float
-        s.
+        Length of the period, s.
     clock : callable
         Returns the time, s.
     """
@@ -66,7 +66,7 @@ class AttemptLimit:
             self._times.popitem(last=False)
 
     def forgive(self, key: str) -> None:
-        """Uncount the latest attempt, which was right."""
+        """Remove the latest attempt from the count, because it succeeded."""
         times = self._times.get(key)
         if times:
             times.pop()
@@ -82,23 +82,23 @@ def _digest(text: str) -> str:
 @dataclass(frozen=True)
 class _Session:
     account: str
-    """The digest of the account's line: a changed password or role ends its sessions."""
+    """Digest of the account's line, so that a changed password or role ends its sessions."""
     end: float
 
 
 class Sessions:
-    """The sessions of a dashboard; of each token only a digest is kept.
+    """The sessions of a dashboard; only a digest of each token is stored.
 
     Parameters
     ----------
     accounts : sequence of Account
-        Who may have one.
+        Accounts that may have a session.
     lifetime : float
-        Time from log-in to the end, s.
+        Duration of a session, s.
     clock : callable
         Returns the time, s since 1970.
     file : Path or None
-        Where sessions survive a restart. It is made with mode 600.
+        File, created with mode 600, that keeps sessions across a restart.
     log : callable
         Takes a line when the file can no longer be written.
 
@@ -127,7 +127,7 @@ class Sessions:
             self._keep()
 
     def begin(self, account: Account) -> str:
-        """Begin a session; return its token. Above 1000 sessions the oldest ends."""
+        """Begin a session and return its token. Above 1000 sessions the oldest ends."""
         token = secrets.token_urlsafe(32)
         now = self._clock()
         live = [item for item in self._sessions.items() if item[1].end > now][1 - _MOST_SESSIONS :]
@@ -137,19 +137,19 @@ class Sessions:
         return token
 
     def account_of(self, token: str | None) -> Account | None:
-        """Return whose session a token is of; None where there is none, or it has ended."""
+        """Return the account of a session token; None if there is no session or it has ended."""
         session = self._sessions.get(_digest(token)) if token else None
         if session is None or session.end <= self._clock():
             return None
         return self._accounts.get(session.account)
 
     def end(self, token: str | None) -> None:
-        """End a session, if it is one."""
+        """End a session, if the token has one."""
         if token and self._sessions.pop(_digest(token), None) is not None:
             self._keep_if_possible()
 
     def _read(self, file: Path) -> None:
-        """Take over the sessions of the file; what is no session is left out."""
+        """Load the sessions of the file; ignore invalid content."""
         with contextlib.suppress(FileNotFoundError):
             require_private(file)
             with contextlib.suppress(ValueError, TypeError, AttributeError):
@@ -159,7 +159,7 @@ class Sessions:
                 }
 
     def _keep_if_possible(self) -> None:
-        """Keep the sessions; go on in memory where the file cannot be written."""
+        """Save the sessions; continue in memory if the file cannot be written."""
         try:
             self._keep()
         except OSError as error:
@@ -186,19 +186,19 @@ _MOST_WAITING = 8
 
 @dataclass(frozen=True)
 class Refusal:
-    """Why nobody was let in.
+    """A refused log-in.
 
     Attributes
     ----------
     wait : int
-        Time until the next try is looked at, s; 0 where name or password was wrong.
+        Time until another attempt is allowed, s; 0 if name or password was wrong.
     """
 
     wait: int
 
 
 def network_of(address: str) -> str:
-    """Return what one household has of addresses: an IPv4 address, or 64 bits of IPv6."""
+    """Return the addresses of one household: an IPv4 address, or a /64 network of IPv6."""
     try:
         known = ipaddress.ip_address(address)
     except ValueError:
@@ -210,18 +210,18 @@ def network_of(address: str) -> str:
 
 
 class LogIn:
-    """Lets in who knows a password.
+    """Logs in visitors by name and password.
 
-    An address has 10 wrong tries in 15 minutes, a name 20 from everywhere. An unknown name takes
-    as long as a known one, is counted as one, and has the same answer. Passwords are compared one
-    at a time in a thread, so that tries cannot take the machine from its work.
+    In 15 minutes an address has 10 wrong attempts, and a name 20 from all addresses. An unknown
+    name is indistinguishable from a known one: time, counting and answer are the same. A thread
+    compares one password at a time, so that attempts cannot overload the machine.
 
     Parameters
     ----------
     access : Access
         The accounts.
     sessions : Sessions
-        Where a session begins.
+        The sessions.
     clock : callable
         Returns the time, s.
     """
@@ -240,9 +240,9 @@ class LogIn:
         self._waiting = 0
 
     async def attempt(self, name: str, password: str, address: str) -> str | Refusal:
-        """Return the token of a new session, or why there is none.
+        """Return the token of a new session, or a refusal.
 
-        An attempt counts before it is compared: many at once get no further than one by one.
+        An attempt is counted before the comparison, so that simultaneous attempts gain nothing.
         """
         network, name = network_of(address), name[:64]
         wait = max(self._addresses.wait(network), self._names.wait(name))

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Valves in words: which are shown and in which order, their rows, two side by side."""
+"""The list of valves: its filters, order and rows; and the comparison of two valves."""
 
 import math
 from collections.abc import Callable, Iterable, Mapping
@@ -29,13 +29,13 @@ from valve_friction_ros.wording import number_and_width, with_width
 
 
 def address_of(path: str, parts: Mapping[str, str]) -> str:
-    """Return the address of a page with the parts that say something."""
+    """Return the address of a page, without empty parts."""
     query = urlencode({key: text for key, text in parts.items() if text})
     return f"{path}?{query}" if query else path
 
 
 def zone_asked(query: Mapping[str, str], usual: str) -> ZoneInfo:
-    """Return the zone that an address asks for by ``tz``; the usual one for an unknown name."""
+    """Return the time zone from ``tz`` in an address; `usual` if missing or unknown."""
     try:
         return zone_of(query.get("tz", usual))
     except ValueError:
@@ -43,7 +43,7 @@ def zone_asked(query: Mapping[str, str], usual: str) -> ZoneInfo:
 
 
 def moment(stamp: int | None, zone: ZoneInfo) -> str:
-    """Write a time, ns since 1970, in a zone, with the zone's short name."""
+    """Write a time, ns since 1970, in a zone, with the abbreviation of the zone."""
     if stamp is None:
         return "–"
     local: datetime = utc(stamp).astimezone(zone)
@@ -51,7 +51,7 @@ def moment(stamp: int | None, zone: ZoneInfo) -> str:
 
 
 def ago(seconds: float) -> str:
-    """Write how long ago something was, in its largest unit."""
+    """Write an age in its largest unit."""
     for size, unit in ((86_400 * 365.25, "y"), (86_400, "d"), (3600, "h"), (60, "min")):
         if seconds >= size:
             return f"{seconds // size:.0f} {unit}"
@@ -59,18 +59,18 @@ def ago(seconds: float) -> str:
 
 
 STATES = ("error", "silent", "warn", "unknown", "ok", "unheard")
-"""States of a valve, the worst first; ``unheard``: only the history knows it.
+"""States of a valve, the worst first; ``unheard``: known only from the history.
 
-A silent valve may be anything, and comes after an error."""
+A silent valve may be in any condition, so it comes next to an error."""
 
 SIGNALS = tuple(one.value for one in StatusSignal if one.value)
 _LONGEST_SEARCH = 200
 
 
 def state_of(valve: Heard) -> str:
-    """Return the state of a valve: its level in small letters, or that it is silent.
+    """Return the state of a valve: its level in lower case, or that it is silent.
 
-    A valve is ``ok`` only where a comparison with a baseline found nothing.
+    A valve is ``ok`` only if a comparison with a baseline found nothing.
     """
     if valve.is_silent:
         return "unheard" if valve.silent_for is None else "silent"
@@ -81,7 +81,7 @@ def state_of(valve: Heard) -> str:
 
 
 def _falling(value: float | None) -> float:
-    """Return the key by which the largest number comes first, and a missing one last."""
+    """Return a sort key with the largest number first and a missing number last."""
     return math.inf if value is None or math.isnan(value) else -value
 
 
@@ -89,8 +89,8 @@ def _worst_first(valve: Heard) -> tuple[Any, ...]:
     state, view = state_of(valve), valve.view
     return (
         STATES.index(state),
-        -(view.level or 0) if state == "silent" else 0,  # what it has said last
-        # A friction that has halved has changed as much as one that has doubled.
+        -(view.level or 0) if state == "silent" else 0,  # its last known level
+        # Halved friction has changed as much as doubled friction.
         -abs(math.log(view.ratio.value)) if view.ratio and view.ratio.value > 0 else 1.0,
         _falling(view.dead_band.if_determined.value),
         view.tag,
@@ -106,25 +106,25 @@ SORTS: dict[str, Callable[[Heard], tuple[Any, ...]]] = {
     "drift": lambda one: (_falling(one.view.drift and abs(one.view.drift.value)), one.view.tag),
     "age": lambda one: (one.view.identified or 0, one.view.tag),
 }
-"""Orders by name: the key of each puts the most urgent or the largest first."""
+"""Sort keys by name; each puts the most urgent or the largest first."""
 
 
 @dataclass(frozen=True)
 class Selection:
-    """What a page of the plant shows.
+    """Filters and order of a plant page.
 
     Attributes
     ----------
     search : str
-        Words; each must be in tag, name or diagnosis.
+        Words; each must occur in tag, name or diagnosis.
     states, signals : frozenset of str
-        States and letters of NE 107 that are shown; empty: all.
+        States and letters of NE 107 to show; empty for all.
     sort : str
         Name of the order (`SORTS`).
     is_reversed : bool
-        Whether the order is turned round.
+        Whether the order is reversed.
     is_tiled : bool
-        Whether valves are tiles, and not rows.
+        Whether to show tiles instead of rows.
     """
 
     search: str = ""
@@ -136,7 +136,7 @@ class Selection:
 
     @classmethod
     def from_query(cls, query: Mapping[str, str]) -> "Selection":
-        """Read an address; what is unknown in it is left out."""
+        """Read the selection from an address; ignore unknown parts."""
         order = query.get("sort", "worst")
         name = order.removeprefix("-")
         return cls(
@@ -150,7 +150,7 @@ class Selection:
 
     @classmethod
     def from_address(cls, address: str) -> "Selection":
-        """Read the address of a page of the plant; what shows all for that of another page."""
+        """Read the selection from a plant page's address; for another page, select all."""
         try:
             parts = urlsplit(address)
             return cls.from_query(dict(parse_qsl(parts.query)) if parts.path == "/" else {})
@@ -158,7 +158,7 @@ class Selection:
             return cls()
 
     def to_query(self) -> dict[str, str]:
-        """Return what an address has to hold; nothing that is usual."""
+        """Return the parts of the address, without defaults."""
         sign = "-" if self.is_reversed else ""
         parts = {
             "q": self.search,
@@ -174,7 +174,7 @@ class Selection:
         return address_of("/", {**self.to_query(), **more})
 
     def sorted_by(self, name: str) -> "Selection":
-        """Sort by a column; a second time turns it round."""
+        """Sort by a column; a second time reverses the order."""
         return replace(self, sort=name, is_reversed=self.sort == name and not self.is_reversed)
 
     def shows(self, valve: Heard) -> bool:
@@ -189,7 +189,7 @@ class Selection:
 
 
 def selected(valves: Iterable[Heard], selection: Selection) -> list[Heard]:
-    """Return the valves that are shown, in order."""
+    """Return the selected valves in order."""
     shown = filter(selection.shows, valves)
     return sorted(shown, key=SORTS[selection.sort], reverse=selection.is_reversed)
 
@@ -204,7 +204,7 @@ def levels_in(valves: Iterable[Heard]) -> dict[str, int]:
 
 _SAY = 240
 _LOWEST, _HIGHEST = 0.25, 4.0
-"""Ends of the bar of a ratio, a logarithmic axis."""
+"""Ends of the logarithmic bar of a ratio."""
 
 STATE_WORDS = {**{state: state for state in STATES}, "ok": "good", "unheard": "not heard"}
 
@@ -217,10 +217,10 @@ SIGNAL_WORDS = {
 }
 _SHORT = {"F": "failure", "C": "check", "S": "out of spec", "M": "maintenance"}
 FRICTIONS = {"coulomb_friction": "F_c", "sliding_friction": "sliding"}
-"""What a friction is called beside its number."""
+"""Short names of the frictions, shown beside their numbers."""
 
 Row = dict[str, Any]
-"""A row under fixed keys: no key is ever a text from outside."""
+"""A row under fixed keys: no key comes from outside."""
 
 
 def state_words(valve: Heard) -> str:
@@ -237,7 +237,7 @@ def state_words(valve: Heard) -> str:
 
 
 def summary(counts: Mapping[str, int]) -> str:
-    """Say how many valves there are, and how many of each state that is not good."""
+    """Return the number of valves, and the number in each state other than good."""
     total = sum(counts.values())
     if not total:
         return "No valve yet"
@@ -247,18 +247,18 @@ def summary(counts: Mapping[str, int]) -> str:
 
 
 def ratio_text(ratio: float) -> str:
-    """Write a ratio with two decimals, or with two digits where these would not show it."""
+    """Write a ratio with two decimals, or two digits if it is very small or large."""
     return f"{ratio:.2f}" if ratio == 0 or 0.01 <= abs(ratio) < 1e4 else f"{ratio:.2g}"
 
 
 def interval_text(ratio: Ratio, between: str) -> str:
-    """Write the interval of a ratio; empty where it has none."""
+    """Write the interval of a ratio; empty without an interval."""
     ends = (ratio.low, ratio.high)
     return between.join(map(ratio_text, ends)) if all(map(math.isfinite, ends)) else ""
 
 
 def quantity_texts(one: Quantity) -> tuple[str, str]:
-    """Write a quantity and half its interval; a dash where the record does not determine it."""
+    """Write a quantity and half its interval; a dash if the record does not determine it."""
     known = one.if_determined
     return number_and_width(known.value, known.half_width)
 
@@ -317,12 +317,12 @@ def row_of(valve: Heard, spark: Sparkline | None, wall: float, href: str) -> Row
 
 
 class RowFeed:
-    """What one browser has been sent, so that it is sent only what has changed.
+    """Rows for one browser; sends only changes.
 
     Parameters
     ----------
     href : callable
-        Returns the address of a valve's page, from the name of its identifier.
+        Returns the address of a valve's page from the name of its identifier.
     """
 
     def __init__(self, href: Callable[[str], str]) -> None:
@@ -337,9 +337,9 @@ class RowFeed:
         wall: float,
         most: int | None = None,
     ) -> Row:
-        """Return the clock, the rows that have changed, and the order if it has.
+        """Return the clock, the changed rows, and the order if it has changed.
 
-        With `most` no more rows than that; the others come next time.
+        `most` limits the number of rows; the rest follow next time.
         """
         rows: list[Row] = []
         order: list[int] = []
@@ -361,7 +361,7 @@ class RowFeed:
 
 @dataclass(frozen=True)
 class ComparedIdentification:
-    """One identification: of which valve, when (ns since 1970), how, and what it found."""
+    """An identification: valve, time, ns since 1970, method, diagnosis and parameters."""
 
     tag: str
     time: int | None
@@ -377,11 +377,11 @@ class Difference:
     Attributes
     ----------
     name : str
-        The parameter.
+        Name of the parameter.
     one, other : Quantity
-        It on either side, without a value where it is not there.
+        The parameter on either side, without a value if missing.
     ratio, half_width : float
-        The other over the one, and half the width of its 95 % interval; nan where unknown.
+        `other` over `one`, and half the width of its 95 % interval; nan if unknown.
     """
 
     name: str
@@ -392,7 +392,7 @@ class Difference:
 
     @property
     def verdict(self) -> str:
-        """Whether the two differ by more than their intervals; empty where that is unknown."""
+        """Whether the two differ by more than their intervals; empty if unknown."""
         if not math.isfinite(self.half_width):
             return ""
         change = self.other.value - self.one.value
@@ -410,13 +410,13 @@ class Difference:
 
 
 def side_of_view(view: ValveView) -> ComparedIdentification:
-    """Return what is known of a valve now."""
+    """Return the present identification of a valve."""
     method = printable(view.values.get("method", "–"), 80)
     return ComparedIdentification(view.tag, view.identified, method, view.sentence, view.parameters)
 
 
 def side_of_entry(entry: HistoryEntry) -> ComparedIdentification:
-    """Return what the history keeps of an identification."""
+    """Return an identification from the history."""
     units = {**UNITS, SLIDING: "N"}
     parameters = tuple(
         Quantity(name, p.value, p.half_width, units.get(name, ""), p.verdict.value, p.reason)
@@ -428,9 +428,10 @@ def side_of_entry(entry: HistoryEntry) -> ComparedIdentification:
 
 
 def compared(one: ComparedIdentification, other: ComparedIdentification) -> tuple[Difference, ...]:
-    """Compare all parameters of either side, in the order of the first.
+    """Compare all parameters of both sides, in the order of the first side.
 
-    The interval of a ratio adds the relative half widths of both sides as independent.
+    The interval of a ratio treats both sides as independent: it adds the squares of their relative
+    half widths.
     """
     left = {each.name: each for each in one.parameters}
     right = {each.name: each for each in other.parameters}

@@ -7,4 +7,4 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The pages of the dashboard, drawn by NiceGUI."""
+"""The pages of the dashboard, drawn with NiceGUI."""

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The page *Alarms*: those that stand, and all events, listed, filtered, answered, exported."""
+"""The page *Alarms*: lists, filters, answers and exports current alarms and all events."""
 
 import asyncio
 import time
@@ -54,15 +54,15 @@ _PERIOD = 1.0
 
 
 class AlarmTable(RowTable, component="alarm_table.js"):
-    """Alarms, or events, as rows."""
+    """Alarms or events as rows."""
 
 
 async def asked_of_person(
     title: str, actions: Sequence[AlarmAction], name: str, chosen: AlarmAction | None = None
 ) -> Asked | None:
-    """Ask for an action, a name, words and a time; None where nothing shall be done.
+    """Ask for an action, a name, a comment and a duration; return None if cancelled.
 
-    The name is that of the account, where there is one.
+    With an account, its name is fixed.
     """
     made: list[Any] = []
 
@@ -89,7 +89,7 @@ async def asked_of_person(
 
 
 class _AlarmPage:
-    """What one browser looks at: its selection, and the events that its rows are of."""
+    """The page of one browser: its selection, and the events in its rows."""
 
     def __init__(self, context: DashboardContext, selection: AlarmSelection) -> None:
         self._context, self._selection = context, selection
@@ -131,7 +131,7 @@ class _AlarmPage:
         self._dress(made, title)
 
     def _several(self, title: str, names: Mapping[Any, str], what: str) -> None:
-        """Draw a choice of several; none: all."""
+        """Draw a multiple choice; an empty choice selects all."""
         texts = {one.name: words for one, words in names.items()}
         by_name = {one.name: one for one in names}
         value = [one.name for one in getattr(self._selection, what)]
@@ -169,7 +169,7 @@ class _AlarmPage:
         try:
             chosen = one.chosen(time.time_ns())
             found = await run.io_bound(history.alarms, chosen, one.is_journal, MOST_ROWS + 1)
-            events = found or ()  # None while the server ends
+            events = found or ()  # None during shutdown
         except HistoryError as error:
             problem = str(error)
         self._shown, self._events = state, events[:MOST_ROWS]
@@ -193,7 +193,7 @@ class _AlarmPage:
     # Answers
 
     async def _ask(self, given: object) -> None:
-        """Ask what shall be done with the alarm of a row."""
+        """Ask for an action on the alarm of a row."""
         if not (isinstance(given, list) and len(given) == 2 and isinstance(given[0], int)):
             return
         number, name = given
@@ -229,7 +229,7 @@ class _AlarmPage:
         self._answer.tell(*answer)
 
     async def _call(self, alarms: Sequence[tuple[str, str]], asked: Asked) -> None:
-        """Make a request for each alarm; those of several valves at once, of one in turn."""
+        """Make a request for each alarm: valves in parallel, alarms of one valve in turn."""
         self._is_busy = True
         self._answer.say("busy", f"{ACTIONS[asked.action]} …")
         by_valve: dict[str, list[str]] = {}
@@ -258,7 +258,7 @@ class AlarmStates:
     Parameters
     ----------
     context : DashboardContext
-        Whom it asks.
+        Context that calls the services.
     node : str
         The identifier.
     """
@@ -268,7 +268,7 @@ class AlarmStates:
         self._alarms: tuple[ValveAlarm, ...] | None = None
 
     def draw(self) -> None:
-        """Draw it, still without alarms."""
+        """Draw the panel, still without alarms."""
         self._body = element("div")
         self._answer = AnswerLine()
         if self._context.visitors.may_operate():
@@ -281,7 +281,7 @@ class AlarmStates:
                     ).props("no-caps unelevated dense").classes("vf-act")
 
     def show(self, view: ValveView) -> None:
-        """Show the alarms as they are now."""
+        """Show the present alarms."""
         if view.alarms == self._alarms:
             return
         self._alarms = view.alarms

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The pages *Plant*, the worst valve first, and *Compare*, two identifications side by side."""
+"""The page *Plant*, the worst valve first, and *Compare*, with two identifications."""
 
 import time
 from collections.abc import Callable
@@ -52,11 +52,10 @@ from valve_friction_ros.history import HistoryError, ValveHistory
 
 _PERIOD = 1.0
 _FIRST_PERIOD, _FIRST_TIME = 0.25, 10.0
-"""Period, s, in which a page looks at first, and for how long: after a restart of the dashboard the
-valves are heard then."""
+"""Initial refresh period of a page, s, and its duration, s: after a restart of the dashboard this
+is when messages from valves arrive."""
 _FIRST_ROWS = 100
-"""Rows that a page is sent with, more than a screen shows; the others follow once it is connected,
-while a person already reads."""
+"""Rows sent with the page, more than a screen shows; the rest follow once it is connected."""
 _KEPT_STATES = tuple(one for one in STATES if one not in ("silent", "unheard"))
 _COLUMNS = [
     {"key": key, "title": title, "unit": unit, "sort": sort, "css": f"vf-c-{key}"}
@@ -86,7 +85,7 @@ class PlantTable(RowTable, component="plant_table.js"):
 
 
 class _PlantPage:
-    """What one browser looks at: its selection, and what it has been sent."""
+    """The page of one browser: its selection, and the rows sent so far."""
 
     def __init__(self, context: DashboardContext, selection: Selection) -> None:
         self._context = context
@@ -222,7 +221,7 @@ _MOST_CHOICES = 400
 
 
 class _ComparePage:
-    """What one browser compares."""
+    """The comparison in one browser."""
 
     def __init__(self, context: DashboardContext, query: dict[str, str]) -> None:
         self._context = context
@@ -255,7 +254,7 @@ class _ComparePage:
             await self._show()
 
     def _heard_now(self) -> tuple[tuple[int, bool] | None, ...]:
-        """Return what tells the views of now apart; None for a side that the history holds."""
+        """Return a key of each side's live view; None for a side from the history."""
         found = []
         for side in _SIDES:
             heard = None
@@ -348,7 +347,7 @@ def _side_words(one: Quantity) -> str:
 
 
 async def compare_page(context: DashboardContext, query: dict[str, str]) -> None:
-    """Draw the page; the address names two valves and the times of their identifications."""
+    """Draw the page for the two valves and identification times in the address."""
     page = _ComparePage(context, query)
     with frame(context, query, "Compare · valve friction", page.address) as inside:
         await page.draw(inside)

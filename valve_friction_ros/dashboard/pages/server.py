@@ -33,13 +33,13 @@ from valve_friction_ros.history import HistoryError, alarms_as_csv
 _Draw = Callable[[DashboardContext, dict[str, str]], Awaitable[None] | None]
 
 _FILES = "/files/"
-"""Where the paths of reports and bags begin."""
+"""Prefix of the paths of reports and bags."""
 _GRACE = 1
-"""Time, s, that open connections have at the end."""
+"""Time for open connections to finish at shutdown, s."""
 
 
 def require_free(host: str, port: int) -> None:
-    """Raise ValueError if an address cannot be listened at."""
+    """Raise ValueError if the server cannot listen on an address."""
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     with socket.socket(family) as tried:
         tried.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -52,7 +52,7 @@ def require_free(host: str, port: int) -> None:
 
 
 class _Gone(logging.Filter):
-    """Leaves out that a browser went while its page was made: Starlette takes it for a failure."""
+    """Drops the error that Starlette logs when a browser leaves before its page is ready."""
 
     def filter(self, record: logging.LogRecord) -> bool:
         error = record.exc_info[1] if record.exc_info else None
@@ -86,13 +86,13 @@ def serve(
     log: Callable[[str], None],
     is_active: Callable[[], bool],
 ) -> None:
-    """Serve the pages until Ctrl-C or SIGTERM; call `started` once they can be opened.
+    """Serve the pages until Ctrl-C or SIGTERM, and call `started` once they can be opened.
 
-    `log` takes the lines on connections that were ended. Pages are refused while not `is_active`.
+    `log` takes the lines on ended connections. Pages are refused unless `is_active`.
     """
     app.add_middleware(_Resting, is_active=is_active)
     load_style()
-    app.config.quasar_config["loadingBar"]["skipHijack"] = True  # it has no name for readers
+    app.config.quasar_config["loadingBar"]["skipHijack"] = True  # it has no name for screen readers
     logging.getLogger("uvicorn.error").addFilter(_Gone())
     pages: dict[str, _Draw] = {
         "/": plant_page,
@@ -129,9 +129,9 @@ def serve(
 
 
 class LightlyPacked(GZipMiddleware):
-    """Compresses what is sent, but little: at the usual level 9 a first visit takes a second.
+    """Compresses responses lightly: at the default level 9 a first visit takes a second.
 
-    Reports and bags go as they are: bags are large and hardly become smaller.
+    Reports and bags are not compressed: bags are large and hardly shrink.
     """
 
     def __init__(self, application: ASGIApp) -> None:
@@ -152,7 +152,7 @@ def _add_page(context: DashboardContext, path: str, draw: _Draw) -> None:
 
 
 def _add_export(context: DashboardContext) -> None:
-    """Offer the alarms that an address selects as CSV."""
+    """Serve the alarms selected by an address as CSV."""
 
     def exported(request: Request) -> Response:
         selection = AlarmSelection.from_query(dict(request.query_params))
@@ -168,11 +168,11 @@ def _add_export(context: DashboardContext) -> None:
 
 
 _SANDBOX = "sandbox; default-src 'none'; img-src data:; style-src 'unsafe-inline'"
-"""What a report may do: it is a file from outside, so it runs no script and loads nothing."""
+"""Policy for reports: they come from outside, so they run no script and load nothing."""
 
 
 def _add_files(files: ValveFiles) -> None:
-    """Offer reports and bags, from their folders alone."""
+    """Serve reports and bags, only from their folders."""
 
     def offered(kind: str, path: str) -> Response:
         found = files.found(kind, path)

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The frame of every page, and its parts: style, navigation, chips, cards, tables, values."""
+"""The frame of every page and its parts: style, navigation, chips, cards, tables, values."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -25,14 +25,14 @@ from valve_friction_ros.outside_text import printable
 
 
 class RowTable(ui.element):
-    """Rows that the browser keeps; it is sent what has changed.
+    """Rows kept by the browser, which receives only changes.
 
     Parameters
     ----------
     initial : mapping
-        What it shows at first.
+        Initial content.
     **props : object
-        What else its component in the browser takes, by name.
+        Further properties of the component in the browser.
     """
 
     def __init__(self, initial: Mapping[str, Any], **props: Any) -> None:
@@ -40,12 +40,12 @@ class RowTable(ui.element):
         self._props.update({"initial": dict(initial), **props})
 
     def send(self, news: Mapping[str, Any]) -> None:
-        """Send what has changed, under the names that `initial` has."""
+        """Send changes under the keys of `initial`."""
         self.run_method("update", dict(news))
 
 
 class AddressBar(ui.element, component="address.js"):
-    """The address of the page, which holds its state."""
+    """The address of the page, which holds the state of the page."""
 
     def show(self, address: str) -> None:
         """Show another address without loading it."""
@@ -64,7 +64,7 @@ def load_style() -> None:
 
 
 def element(tag: str, css: str = "", **attributes: str) -> ui.element:
-    """Make an element of HTML; its attributes are never markup."""
+    """Make an HTML element; attribute values are never parsed as markup."""
     made = ui.element(tag).classes(css)
     for name, value in attributes.items():
         made.props[name.replace("_", "-")] = value
@@ -73,18 +73,18 @@ def element(tag: str, css: str = "", **attributes: str) -> ui.element:
 
 @dataclass(frozen=True)
 class Frame:
-    """What the frame of a page gives to its content.
+    """The frame of a page, as its content uses it.
 
     Attributes
     ----------
     zone : ZoneInfo
-        Zone of the times.
+        Time zone.
     common : dict of str to str
-        Parts of the address that all pages share: zone and theme.
+        Parts of the address common to all pages: zone and theme.
     address : AddressBar
         The address of the page.
     clock : ui.label
-        Shows the time of day.
+        Label with the time of day.
     """
 
     zone: ZoneInfo
@@ -93,7 +93,7 @@ class Frame:
     clock: ui.label
 
     def link(self, path: str, **parts: str) -> str:
-        """Return the address of a page, in the same zone and theme."""
+        """Return the address of a page in the same zone and theme."""
         return address_of(path, {**parts, **self.common})
 
 
@@ -104,7 +104,7 @@ def frame(
     title: str,
     here: Callable[[dict[str, str]], str],
 ) -> Iterator[Frame]:
-    """Draw the frame of a page; `here` returns its address with other common parts."""
+    """Draw the frame of a page; `here` returns its address with given common parts."""
     zone = zone_asked(query, context.options.time_zone)
     theme = query.get("theme", "auto")
     common = {key: query[key] for key in _COMMON if query.get(key)}
@@ -112,7 +112,7 @@ def frame(
     ui.dark_mode(_THEMES.get(theme))
     around = ui.context.client.content.parent_slot
     if around is not None:
-        around.parent.tag = "div"  # q-page would be a second `main`, with the bar in it
+        around.parent.tag = "div"  # q-page would be a second `main`, around the bar
     address = AddressBar()
     link("Skip to the content", "#content").classes("vf-skip")
     with element("header", "vf-bar-top"):
@@ -148,7 +148,7 @@ def _choice(
     common: dict[str, str],
     here: Callable[[dict[str, str]], str],
 ) -> None:
-    """Draw a choice that loads the page anew, with its part of the address changed."""
+    """Draw a choice that reloads the page with the changed part of its address."""
     several = [*choices]
     made = ui.select(several, value=chosen if chosen in several else several[0])
     made.on_value_change(lambda event: ui.navigate.to(here({**common, key: str(event.value)})))
@@ -157,11 +157,11 @@ def _choice(
 
 
 _LONG = 40
-"""Characters from which a value stands below its name."""
+"""Length above which a value is shown below its name."""
 
 
 def text(tag: str, words: str, css: str = "") -> ui.element:
-    """Make an element with a text, which is never markup."""
+    """Make an element with a text, which is never parsed as markup."""
     with element(tag, css) as made:
         ui.label(words)
     return made
@@ -176,7 +176,7 @@ def link(words: str, href: str, css: str = "", **attributes: str) -> ui.element:
 
 
 def search_field(words: str, searched: str, select: Callable[..., None]) -> None:
-    """Draw the field of a search; what is written there is selected as ``search``."""
+    """Draw a search field that passes its text to `select` as ``search``."""
     with element("div", "vf-search"):
         made = ui.input(
             placeholder=words,
@@ -187,21 +187,21 @@ def search_field(words: str, searched: str, select: Callable[..., None]) -> None
 
 
 def redraw(body: ui.element, draw: Callable[[], object]) -> None:
-    """Draw the inside of an element anew."""
+    """Redraw the content of an element."""
     body.clear()
     with body:
         draw()
 
 
 def retitle(made: ui.element, words: str) -> None:
-    """Change the text of an element that `text` has made."""
+    """Change the text of an element made by `text`."""
     label = made.default_slot.children[0]
     if isinstance(label, ui.label):
         label.set_text(words)
 
 
 def chip(state: str, word: str, letter: str = "") -> ui.element:
-    """Show a state by a colour, a word and, where it has one, its letter of NE 107."""
+    """Show a state by a colour, a word and its NE 107 letter, if any."""
     with element("span", f"vf-chip vf-{state}") as made:
         if letter:
             text("b", letter, "vf-ne")
@@ -210,7 +210,7 @@ def chip(state: str, word: str, letter: str = "") -> ui.element:
 
 
 class AnswerLine(ui.label):
-    """The line that says what has come of a request; unseen until then."""
+    """The line with the outcome of a request; hidden until then."""
 
     def __init__(self) -> None:
         super().__init__("")
@@ -218,13 +218,13 @@ class AnswerLine(ui.label):
         self.set_visibility(False)
 
     def say(self, state: str, words: str) -> None:
-        """Show words: ``busy``, ``ok`` or ``error``."""
+        """Show words in the state ``busy``, ``ok`` or ``error``."""
         self.classes(replace=f"vf-answer vf-answer-{state}")
         self.set_visibility(True)
         self.set_text(words)
 
     def tell(self, success: bool, words: str) -> None:
-        """Show what a service has answered."""
+        """Show the answer of a service."""
         self.say("ok" if success else "error", printable(words, 500))
 
 
@@ -235,7 +235,7 @@ async def agreed(
     answers: tuple[str, str],
     cancel: str = "flat no-caps autofocus",
 ) -> bool:
-    """Ask in a dialog, which `draw` fills; return whether the second of both answers was given."""
+    """Ask in a dialog, filled by `draw`; return whether the second answer was chosen."""
     with ui.dialog() as dialog, ui.card().classes("vf-dialog"):
         dialog.props["aria-label"] = name
         ui.label(title).classes("vf-dialog-title")
@@ -246,7 +246,7 @@ async def agreed(
             confirm = ui.button(yes, on_click=lambda: dialog.submit(True), color=None)
             confirm.props("unelevated no-caps").classes("vf-act-first")
     is_agreed = bool(await dialog)
-    if not dialog.is_deleted:  # the visitor may have gone meanwhile
+    if not dialog.is_deleted:  # the visitor may have left meanwhile
         dialog.delete()
     return is_agreed
 
@@ -288,12 +288,12 @@ def table(titles: Iterable[str], rows: Iterable[Iterable[str]]) -> None:
 
 
 class EntryList:
-    """Values with their names and units; only what has changed is drawn anew.
+    """Values with their names and units; only changes are redrawn.
 
     Parameters
     ----------
     empty : str
-        What is said where there are none.
+        Text shown without values.
     """
 
     def __init__(self, empty: str) -> None:

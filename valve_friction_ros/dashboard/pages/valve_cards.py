@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Cards of the page *Valve*: its parameters, signals, trend, and what is kept of it."""
+"""Cards of the page *Valve*: parameters, signals, trend and history."""
 
 import json
 import time
@@ -88,11 +88,11 @@ def _draw_baseline(one: Quantity) -> None:
 _STRIP_COLUMNS = 500
 _LOOP_POINTS = 1200
 _SIGNATURE_EVERY = 5
-"""Times that the strip is drawn between two times that the signature is."""
+"""Number of strip updates per update of the signature."""
 
 
 class ValveSignals:
-    """Both charts of the signals; only what has changed is sent.
+    """Both charts of the signals; only changes are sent.
 
     Parameters
     ----------
@@ -107,13 +107,13 @@ class ValveSignals:
         self._loop: ui.echart | None = None
 
     def draw(self) -> None:
-        """Draw the signals over time, still without any."""
+        """Draw the empty chart of the signals over time."""
         words = "Pressure and stem of the last 60 seconds"
         self._live = _chart(live_chart(self._strip.span), "vf-chart-live", words)
         self._note = text("p", "No samples have been received yet.", "vf-none")
 
     def draw_signature(self, kept: ValveHistory | None) -> None:
-        """Draw the signature of the baseline; that of now follows."""
+        """Draw the signature of the baseline; the present signature follows."""
         healthy = None if kept is None else kept.set_baseline
         record = None if healthy is None else healthy.record
         self._loop = _chart(loop_chart(record), "vf-chart-loop", "Signature: stem over pressure")
@@ -122,7 +122,7 @@ class ValveSignals:
             text("p", "No recording of the baseline is stored.", "vf-none")
 
     def show(self) -> None:
-        """Show what has come since the last time."""
+        """Show the samples that have arrived since the last call."""
         self._shown += 1
         note = self._strip.note()
         retitle(self._note, note)
@@ -145,7 +145,7 @@ def draw_trend(
     zone: ZoneInfo,
     events: Sequence[AlarmEvent] = (),
 ) -> None:
-    """Draw friction over time, with events of alarms, and say its trend; or why there is none."""
+    """Draw friction over time with alarm events and trend, or say why there is none."""
     if problem:
         text("p", problem, "vf-none")
     if kept is None:
@@ -163,7 +163,7 @@ def draw_trend(
 
     drawn = trend_chart(kept, zone, time.time_ns(), events)
     chart = _chart(drawn, "vf-chart-trend", "Friction over time")
-    # Once it is drawn: a drag then chooses a time, as the icon of the toolbox has it.
+    # Once the chart is drawn, a drag selects a time range, like the toolbox icon.
     chart.on(
         "chart:finished",
         js_handler=f"() => {{ const one = getElement({chart.id}); if (!one.drags) {{"
@@ -173,7 +173,7 @@ def draw_trend(
 
 
 def _chart(options: dict[str, Any], css: str, words: str) -> ui.echart:
-    """Draw a chart, which is a picture to those who do not see it."""
+    """Draw a chart, presented as a picture to screen readers."""
     made = ui.echart(options).classes(css)
     made.props["role"], made.props["aria-label"] = "img", words
     return made
@@ -201,7 +201,7 @@ def baseline_words(baseline: Baseline | None) -> str:
 
 
 def _friction(entry: HistoryEntry) -> str:
-    """Write the friction that was compared with the baseline, or one that is known."""
+    """Write the friction that was compared with the baseline, or another known friction."""
     ratio = entry.diagnosis.ratio
     for name in (*([ratio.of] if ratio else []), *FRICTIONS):
         one = entry.parameters.get(name)
@@ -214,7 +214,7 @@ def _friction(entry: HistoryEntry) -> str:
 def draw_identifications(
     history: ValveHistory | None, zone: ZoneInfo, compare: Callable[[int], str]
 ) -> None:
-    """Draw the identifications, the newest first, each with a link to compare it."""
+    """Draw the identifications, the newest first, each with a link to its comparison."""
     if history is None:
         text("p", "The history contains no identification of this valve.", "vf-none")
         return

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The page *Valve*: all that is known of one, and what is asked of its identifier."""
+"""The page *Valve*: the full state of one valve, and the actions of its identifier."""
 
 import time
 from collections.abc import Callable
@@ -69,7 +69,7 @@ from valve_friction_ros.wording import lack_remedies
 
 
 class ValveHead:
-    """Name, state and sentence of a valve, and its most important numbers.
+    """Name, state, diagnosis and main numbers of a valve.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ class ValveHead:
         self._values: dict[str, ui.label] = {}
 
     def draw(self) -> None:
-        """Draw it, still without its values."""
+        """Draw the head, still without values."""
         with element("div", "vf-valve-name"):
             link("‹ Plant", self._page.link("/", **_selection_before()), "vf-back")
             self._title = text("h1", "")
@@ -95,7 +95,7 @@ class ValveHead:
         self._facts = element("div", "vf-facts")
 
     def show(self, view: ValveView, heard: Heard | None, state: str) -> None:
-        """Show the state of a valve and its sentence."""
+        """Show state and diagnosis of the valve."""
         retitle(self._title, view.tag)
         ui.page_title(f"{view.tag} · valve friction")
         self._place.set_text(view.node)
@@ -107,7 +107,7 @@ class ValveHead:
         retitle(self._sentence, view.sentence or "No message has been received from this valve.")
 
     def show_facts(self, view: ValveView, heard: Heard | None) -> None:
-        """Show the numbers, and how old they are now."""
+        """Show the numbers and their age."""
         facts = _facts(view, heard, self._page, self._is_live)
         if not self._values:
             with self._facts:
@@ -156,7 +156,7 @@ def _drift_words(view: ValveView) -> str:
 
 
 def _selection_before() -> dict[str, str]:
-    """Return search and filters of the plant, where the visitor has come from its page."""
+    """Return search and filters of the plant page if the visitor came from it."""
     referrer = ui.context.client.request.headers.get("referer", "")
     return Selection.from_address(referrer).to_query()
 
@@ -179,10 +179,10 @@ def _frictions(found: tuple[Quantity, ...]) -> str:
 
 
 class Question(NamedTuple):
-    """What is asked before a baseline changes: of which valve and estimate, and from what to what.
+    """Question before a baseline changes: valve, estimate, old and new baseline.
 
-    `identified` is the time of the estimate that a baseline is set from, ns since 1970; `alarm` the
-    level of the valve where that is WARN or ERROR.
+    `identified` is the time of the estimate for a new baseline, ns since 1970. `alarm` is the level
+    of the valve if it is WARN or ERROR.
     """
 
     tag: str
@@ -193,7 +193,7 @@ class Question(NamedTuple):
 
 
 def question_of(view: ValveView, new: str | None) -> Question:
-    """Return what to ask of a valve; `new` None: the baseline is set from the estimate."""
+    """Return the question on a valve; without `new` the estimate becomes the baseline."""
     return Question(
         view.tag,
         view.identified if new is None else None,
@@ -220,11 +220,11 @@ class ValveActions:
     node : str
         The identifier.
     now : callable
-        Returns what is known of the valve.
+        Returns the present state of the valve.
     replaced : callable
-        Says in words which baseline a restoration would bring back.
+        Returns in words the baseline that would be restored.
     done : callable
-        Called with the name of a service that has answered.
+        Called with the name of a service after its answer.
     """
 
     def __init__(
@@ -241,7 +241,7 @@ class ValveActions:
         self._buttons: list[ui.button] = []
 
     def draw(self) -> None:
-        """Draw the buttons and the line of the answer."""
+        """Draw the buttons and the answer line."""
         with element("div", "vf-actions", role="group", aria_label="Actions"):
             for service, (title, _) in _ACTIONS.items():
                 self._buttons.append(self._button(service, title))
@@ -261,7 +261,7 @@ class ValveActions:
         return made.classes("vf-act" + (" vf-act-first" if service == "identify" else ""))
 
     async def _told_what_is_missing(self) -> str | None:
-        """Say what a baseline lacks, and what may be done; return what shall be done now."""
+        """Show what a baseline lacks, with remedies; return the chosen action."""
         view = self._now()
         asked = [(one.of, one.lack.name) for one in view.lacks]
 
@@ -280,7 +280,7 @@ class ValveActions:
         return "identify" if is_agreed else None
 
     async def _agreed(self, service: str) -> bool:
-        """Show the old and the new baseline, and ask; again where they have changed meanwhile."""
+        """Show old and new baseline and ask; ask again if they change meanwhile."""
         shown, is_agreed = None, True
         while is_agreed and shown != (question := self._question(service)):
             is_agreed = await self._asked(service, question, is_again=shown is not None)
@@ -336,17 +336,17 @@ class ValveActions:
         self._done(service)
 
     def tick(self) -> None:
-        """Show for how long a call has been under way."""
+        """Show the duration of a call in progress."""
         if self._busy is not None:
             service, begin = self._busy
             self._answer.set_text(f"{_ACTIONS[service][1]} … {time.monotonic() - begin:.0f} s")
 
 
 _MOST_EVENTS = 500
-"""Events of alarms that the trend shows, the newest."""
+"""Maximum number of alarm events in the trend, the newest."""
 _PERIOD = 0.2
 _SLOWER = 5
-"""Beats of the timer between two looks at all but the signals."""
+"""Timer beats per update of everything but the signals."""
 _LISTS = (
     ("changes", "Changes since the baseline", "Nothing has been compared with a baseline yet."),
     ("evidence", "Moves in service", "No moves have been evaluated yet."),
@@ -355,15 +355,15 @@ _LISTS = (
     ("command", "Answer to the command", "No stem_command has been received."),
     ("counters", "Node and samples", "Nothing has been received yet."),
 )
-"""Group of values, title of its card, and what stands there without any."""
+"""Group of values, title of its card, and text of an empty card."""
 _KEPT = ("fit",)
-"""Groups that a history tells."""
+"""Groups available from a history."""
 _OF_EXPERTS = ("fit", "counters")
 """Groups that are folded away."""
 
 
 class _ValvePage:
-    """What one browser looks at: one valve."""
+    """The page of one valve in one browser."""
 
     def __init__(self, context: DashboardContext, node: str, page: Frame) -> None:
         self._context, self._node, self._page = context, node, page
@@ -447,7 +447,7 @@ class _ValvePage:
     # What is heard
 
     def _look(self) -> None:
-        """Show what is known now, where it has changed."""
+        """Show changes of the valve's state."""
         heard, view = self._heard(), self._view()
         self._page.clock.set_text(moment(time.time_ns(), self._page.zone))
         self._actions.tick()
@@ -525,7 +525,7 @@ class _ValvePage:
 
 
 def valve_page(context: DashboardContext, query: dict[str, str]) -> None:
-    """Draw the page of the valve that the address names by ``node``."""
+    """Draw the page of the valve named by ``node`` in the address."""
     node = query.get("node", "")
 
     def here(common: dict[str, str]) -> str:
