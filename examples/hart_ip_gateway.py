@@ -10,8 +10,8 @@
 """A gateway from HART-IP: two dynamic variables of a positioner become the inputs of an identifier.
 
 ``python examples/hart_ip_gateway.py --ros-args -r __ns:=/fv_101 -p host:=192.0.2.7 ...``; Ctrl-C
-ends it. It needs hartip-py (``pip install hartip-py``), which is under the GPL: so is a program
-that is made of both and given away. Copy it, and change what differs.
+ends it. It needs hartip-py (``pip install hartip-py``), which is under the GPL: a program that
+combines both and is distributed falls under the GPL too. Copy it and adapt it to your device.
 """
 
 import contextlib
@@ -28,22 +28,22 @@ from rclpy.time import Time
 from sensor_msgs.msg import FluidPressure, JointState
 
 LOST = (OSError, HARTError)
-"""What a device that is away, or refuses, raises."""
+"""Errors of a device that is absent or refuses a request."""
 MALFUNCTION = 0x80
-"""Bit of the device status: what it measures may be wrong."""
+"""Bit of the device status: its measurements may be wrong."""
 PARAMETERS = {
     "host": "localhost",
     "port": 5094,
     "protocol": "udp",  # or tcp
     "address": 0,  # polling address behind the gateway or multiplexer
-    "pressure_variable": "SV",  # which dynamic variable it is: PV, SV, TV or QV
+    "pressure_variable": "SV",  # dynamic variable: PV, SV, TV or QV
     "position_variable": "PV",
-    "pressure_scale": 1e5,  # Pa in a unit of the device: bar
-    "position_scale": 0.0,  # m in a unit of the device: for percent the travel over 100
-    "position_at_zero": 0.0,  # m where the device says 0; the travel, and a scale below 0, where
-    # it says the opening of an air-to-close valve
-    "rate": 2.0,  # requests a second; a loop of HART answers two or three
-    "longest": 1.0,  # s from request to answer; a later one is left out, as its time is not known
+    "pressure_scale": 1e5,  # Pa per unit of the device; here bar
+    "position_scale": 0.0,  # m per unit of the device; for percent, travel / 100
+    "position_at_zero": 0.0,  # m at device value 0; for an air-to-close valve whose device gives
+    # the opening, the travel, with a negative scale
+    "rate": 2.0,  # requests per second; a HART loop answers two or three
+    "longest": 1.0,  # longest time to an answer, s; a later one is dropped, as its time is unknown
 }
 
 
@@ -69,12 +69,12 @@ class HartIpGateway(Node):
         return self.get_parameter(name).value
 
     def _follow(self) -> None:
-        """Ask once, and publish the answer; a device that is lost is asked again."""
+        """Send one request and publish the answer; reconnect to a lost device."""
         where = f"{self.value('host')}:{self.value('port')}"
         try:
             if self._is_lost:
                 self._client.connect()
-                self._client.default_unique_addr = None  # another device may be there now
+                self._client.default_unique_addr = None  # the device may have been replaced
                 self._client.read_unique_id().raise_for_error()
             asked = self.get_clock().now()
             answer = self._client.read_dynamic_variables()

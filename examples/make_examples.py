@@ -9,9 +9,9 @@
 
 """Make the two recordings of this folder: `python examples/make_examples.py [FOLDER]`.
 
-A simulated valve FV-101 is moved to random levels. The stamps jitter and the sensors are noisy, the
-pressure by 150 Pa and the stem by 10 µm. The file is what an exporter of a plant would write: local
-time, percent of the travel, bar, and two rows above the headers.
+The simulated valve FV-101 moves to random levels. Stamps jitter, and the sensors are noisy: 150 Pa
+for the pressure and 10 µm for the stem. The files look like a plant export: local time, percent of
+travel, bar, and two rows above the headers.
 """
 
 import sys
@@ -35,7 +35,7 @@ PACKING = KarnoppParameters(
 )
 START = datetime(2026, 11, 21, 8, 0)
 FINE = 10
-"""Steps of the simulation for each sample."""
+"""Simulation steps per sample."""
 
 
 def make(path: Path, seconds: float, rate: float, hold: float, lag: float, seed: int) -> None:

@@ -10,7 +10,7 @@
 """A gateway from Modbus TCP: two values of a device become the inputs of a valve's identifier.
 
 ``python examples/modbus_gateway.py --ros-args -r __ns:=/fv_101 -p host:=plc ...``; Ctrl-C ends it.
-It needs pymodbus (``pip install 'pymodbus>=3.16,<4'``). Copy it, and change what differs.
+It needs pymodbus (``pip install 'pymodbus>=3.16,<4'``). Copy it and adapt it to your device.
 """
 
 import contextlib
@@ -28,22 +28,22 @@ from rclpy.time import Time
 from sensor_msgs.msg import FluidPressure, JointState
 
 LOST = (OSError, ModbusException)
-"""What a device that is away, or refuses, raises."""
+"""Errors of a device that is absent or refuses a request."""
 PARAMETERS = {
     "host": "localhost",
     "port": 502,
-    "device": 1,  # the unit at this address
-    "kind": "input",  # registers: input (function 4, 30001 and on) or holding (3, 40001 and on)
-    "pressure_register": 0,  # the first of the value, counted from 0: 30001 is 0
+    "device": 1,  # unit number at this address
+    "kind": "input",  # input registers (function 4, from 30001) or holding (3, from 40001)
+    "pressure_register": 0,  # first register of the value, counted from 0: 30001 is 0
     "position_register": 2,  # within 120 of the other: one request reads both
     "format": "float32",  # of both values: int16, uint16, int32, uint32, float32 or float64
-    "word_order": "big",  # little where the low word of a value comes first
-    "pressure_scale": 1e5,  # Pa in a unit of the device: bar
-    "position_scale": 0.0,  # m in a unit of the device: for percent the travel over 100
-    "position_at_zero": 0.0,  # m where the device says 0; the travel, and a scale below 0, where
-    # it says the opening of an air-to-close valve
-    "rate": 50.0,  # requests a second
-    "longest": 0.1,  # s from request to answer; a later one is left out, as its time is not known
+    "word_order": "big",  # little if the low word of a value comes first
+    "pressure_scale": 1e5,  # Pa per unit of the device; here bar
+    "position_scale": 0.0,  # m per unit of the device; for percent, travel / 100
+    "position_at_zero": 0.0,  # m at device value 0; for an air-to-close valve whose device gives
+    # the opening, the travel, with a negative scale
+    "rate": 50.0,  # requests per second
+    "longest": 0.1,  # longest time to an answer, s; a later one is dropped, as its time is unknown
 }
 
 
@@ -70,7 +70,7 @@ class ModbusGateway(Node):
         return self.get_parameter(name).value
 
     def _follow(self) -> None:
-        """Ask once, and publish the answer; a device that is lost is asked again."""
+        """Send one request and publish the answer; reconnect to a lost device."""
         where = f"{self.value('host')}:{self.value('port')}"
         try:
             asked = self.get_clock().now()
@@ -92,7 +92,7 @@ class ModbusGateway(Node):
             self._publish(between, pressure, position)
 
     def _read(self) -> tuple[float, float]:
-        """Return both values, of one request: two would be a lag between the signals."""
+        """Read both values in one request: two requests would cause a lag between the signals."""
         client, width = self._client, self._format.value[1]
         if not client.connected and not client.connect():
             raise ConnectionError("no connection")
@@ -124,7 +124,7 @@ class ModbusGateway(Node):
 
 
 if __name__ == "__main__":
-    logging.disable()  # pymodbus says again what this node says
+    logging.disable()  # pymodbus repeats the messages of this node
     rclpy.init()
     with contextlib.suppress(KeyboardInterrupt, ExternalShutdownException):
         rclpy.spin(ModbusGateway())

@@ -10,7 +10,7 @@
 """A gateway from OPC UA: two variables of a server become the inputs of a valve's identifier.
 
 ``python examples/opc_ua_gateway.py --ros-args -r __ns:=/fv_101 -p url:=opc.tcp://plc:4840/ ...``;
-Ctrl-C ends it. It needs asyncua (``pip install asyncua``). Copy it, and change what differs.
+Ctrl-C ends it. It needs asyncua (``pip install asyncua``). Copy it and adapt it to your server.
 """
 
 import asyncio
@@ -26,21 +26,21 @@ from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import FluidPressure, JointState
 
 LOST = (OSError, asyncio.TimeoutError, ua.UaError)
-"""What a server that is away, or ends, raises."""
+"""Errors of a server that is absent or shuts down."""
 PARAMETERS = {
     "url": "opc.tcp://localhost:4840/",
     "pressure_node": "ns=2;s=FV-101.pressure",
     "position_node": "ns=2;s=FV-101.position",
-    "pressure_scale": 1e5,  # Pa in a unit of the server: bar
-    "position_scale": 0.0,  # m in a unit of the server: for percent the travel over 100
-    "position_at_zero": 0.0,  # m where the server says 0; the travel, and a scale below 0, where
-    # the opening of an air-to-close valve is served
-    "sampling": 20.0,  # ms between two samples that the server is asked for
+    "pressure_scale": 1e5,  # Pa per unit of the server; here bar
+    "position_scale": 0.0,  # m per unit of the server; for percent, travel / 100
+    "position_at_zero": 0.0,  # m at server value 0; for an air-to-close valve whose server gives
+    # the opening, the travel, with a negative scale
+    "sampling": 20.0,  # requested sampling interval, ms
 }
 
 
 class OpcUaGateway(Node):
-    """Publishes each change of the two variables, with the stamp of its source."""
+    """Publishes each sample of the two variables with its source timestamp."""
 
     def __init__(self) -> None:
         super().__init__("opc_ua_gateway")
@@ -56,7 +56,7 @@ class OpcUaGateway(Node):
         return self.get_parameter(name).value
 
     def datachange_notification(self, node: Any, value: float, data: Any) -> None:
-        """Publish a sample; asyncua calls it for each. A bad or unstamped one is left out."""
+        """Publish a sample, called by asyncua; skip a bad sample or one without a timestamp."""
         given = data.monitored_item.Value
         stamp = _time(given.SourceTimestamp)
         if stamp is None or not given.StatusCode.is_good():
@@ -72,7 +72,7 @@ class OpcUaGateway(Node):
             self._stems.publish(stem)
 
     def _request(self, node: Any, handle: int) -> ua.MonitoredItemCreateRequest:
-        """Ask for each sample: a server tells only changes of the value unless it is asked."""
+        """Request every sample: by default a server reports only changes of the value."""
         always = ua.DataChangeFilter(Trigger=ua.DataChangeTrigger.StatusValueTimestamp)
         return ua.MonitoredItemCreateRequest(
             ItemToMonitor=ua.ReadValueId(NodeId=node.nodeid, AttributeId=ua.AttributeIds.Value),
@@ -87,7 +87,7 @@ class OpcUaGateway(Node):
         )
 
     async def follow(self) -> None:
-        """Follow the server, again and again if it is lost."""
+        """Follow the server, and reconnect whenever it is lost."""
         log = self.get_logger()
         while rclpy.ok():
             try:
@@ -108,7 +108,7 @@ class OpcUaGateway(Node):
 
 
 def _time(given: datetime | None) -> Time | None:
-    """Return a time of OPC UA, which is UTC."""
+    """Convert an OPC UA time, which is in UTC."""
     if given is None:
         return None
     since = given.replace(tzinfo=timezone.utc) - datetime(1970, 1, 1, tzinfo=timezone.utc)

@@ -7,10 +7,10 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""A gateway to OPC UA: numbers, alarms and NE 107 device health of all valves for a control system.
+"""A gateway to OPC UA: values, alarms and NE 107 device health of all valves for a control system.
 
 ``python examples/opc_ua_health.py --ros-args -p endpoint:=opc.tcp://127.0.0.1:4841/``; Ctrl-C ends
-it. It needs asyncua (``pip install asyncua``). Copy it, and change what differs.
+it. It needs asyncua (``pip install asyncua``). Copy it and adapt it to your system.
 """
 
 import asyncio
@@ -32,20 +32,20 @@ from rclpy.signals import SignalHandlerOptions
 DI = "http://opcfoundation.org/UA/DI/"
 OWN = "urn:valve_friction_ros:health"
 ENUMERATION, ENUM_STRINGS, DEVICE_SET = 6244, 6450, 5001
-"""Numbers of DeviceHealthEnumeration, its strings and DeviceSet in the name space of DI."""
+"""Node numbers of DeviceHealthEnumeration, its strings and DeviceSet in the DI namespace."""
 PARAMETERS = {"endpoint": "opc.tcp://127.0.0.1:4841/", "silent_after": 5.0}
 SEVERITY = {"OK": 1, "WARN": 500, "ERROR": 900}
 NUMBER, ALARM = re.compile(r"(.+?)(?: \[(.+)\])?"), re.compile(r"alarm (\w+)")
-"""Keys of numbers, with their units, and of the states of alarms."""
+"""Keys of values, with units, and of alarm states."""
 GOOD, SILENT = ua.StatusCodes.Good, ua.StatusCodes.UncertainNoCommunicationLastUsableValue
 HEALTH = ("NORMAL", "FAILURE", "CHECK_FUNCTION", "OFF_SPEC", "MAINTENANCE_REQUIRED")
-"""DeviceHealthEnumeration, from 0 on."""
+"""DeviceHealthEnumeration, from 0."""
 SIGNALS = ("", "F", "C", "S", "M")
-"""The same as status signals of NE 107."""
+"""The same states as NE 107 status signals."""
 
 
 class Valve:
-    """The object of a valve in the address space; a variable is made when its value first comes."""
+    """The object of a valve in the address space; variables appear with their first values."""
 
     def __init__(self, server: Server, place: UaNode, spaces: tuple[int, int], tag: str) -> None:
         self._server, self._place, self._tag = server, place, tag
@@ -56,7 +56,7 @@ class Valve:
         self._states: dict[str, str] = {}
 
     async def build(self) -> None:
-        """Make what each valve has."""
+        """Create the nodes common to all valves."""
         self._root = await self._place.add_object(self._id(""), f"{self._own}:{self._tag}")
         for name in ("AssetId", "ComponentName"):
             await self._root.add_property(self._id(name, self._di), f"{self._di}:{name}", self._tag)
@@ -131,7 +131,7 @@ class Valve:
         await self._events.trigger(message=f"{self._tag} {kind}: {state}. {message}".strip())
 
     async def fall_silent(self) -> None:
-        """Mark all values as the last that were heard."""
+        """Mark all values as the last usable values."""
         for name, node in self._nodes.items():
             last = self._served[name]
             if last.StatusCode.value != SILENT:
@@ -145,7 +145,7 @@ def _value(value: Any, kind: ua.VariantType, code: int = GOOD) -> ua.DataValue:
 
 
 class HealthGateway(Node):
-    """Listens to ``/diagnostics``, and serves what it hears."""
+    """Subscribes to ``/diagnostics`` and serves its statuses."""
 
     def __init__(self) -> None:
         super().__init__("opc_ua_health")
@@ -161,7 +161,7 @@ class HealthGateway(Node):
                 self._heard[tag] = time.monotonic(), status
 
     async def serve(self) -> None:
-        """Serve until the end; each valve is an object of DeviceSet."""
+        """Serve until shutdown; each valve is an object in DeviceSet."""
         endpoint, silent_after = (self.get_parameter(name).value for name in PARAMETERS)
         server = Server()
         await server.init()

@@ -7,10 +7,10 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""A dashboard in forty lines: all valves of the graph, worst first, as they tell it.
+"""A dashboard in forty lines: all valves of the ROS graph, the worst first.
 
-``python examples/worst_valves.py`` beside running identifiers; Ctrl-C ends it. One subscription,
-`/diagnostics`, serves every valve. Each latched `~/estimate` holds the same keys for one valve.
+Run ``python examples/worst_valves.py`` while identifiers run; Ctrl-C ends it. One subscription,
+`/diagnostics`, covers all valves. The latched `~/estimate` has the same keys for a single valve.
 """
 
 import contextlib
@@ -24,7 +24,7 @@ LEVELS = ("OK", "WARN", "ERROR", "STALE")
 
 
 class WorstValves(Node):
-    """Keeps the latest status of each valve, and prints the table when one has changed."""
+    """Keeps the latest status of each valve, and prints the table after each change."""
 
     def __init__(self) -> None:
         super().__init__("worst_valves")

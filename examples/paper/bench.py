@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The benches of the reproduction, from their configuration files."""
+"""The simulated benches of the reproduction, read from their configuration files."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
@@ -26,11 +26,11 @@ _PARAMETERS = tuple(field.name for field in fields(KarnoppParameters))
 
 @dataclass(frozen=True)
 class Bench:
-    """A simulated valve with its converter and its sensors, in SI units.
+    """A simulated valve with converter and sensors, in SI units.
 
-    The `truth` is what the identification should find. The pressure without noise acts on the stem.
-    `converter_lag` is the time constant of the V/P converter, `assumed_mass` the nominal mass of
-    the moving parts.
+    `truth` holds the parameters that the identification should find. The noise-free pressure acts
+    on the stem. `converter_lag` is the time constant of the V/P converter, and `assumed_mass` the
+    nominal mass of the moving parts.
     """
 
     name: str
@@ -55,7 +55,7 @@ class Bench:
 def read_bench(folder: Path, name: str) -> Bench:
     """Read a bench from ``bench_<name>.yaml``, the parameter file of its three nodes.
 
-    Raises ValueError, one line with the file and the cause.
+    Raises ValueError with the file and the cause in one line.
     """
     path = folder / f"bench_{name}.yaml"
     content = read_yaml(path)

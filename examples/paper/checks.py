@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""All comparisons with the paper, in its order; their criteria were set beforehand."""
+"""All comparisons with the paper, in the paper's order; the criteria were set beforehand."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -26,10 +26,10 @@ from valve_friction_ros.signals import differentiate
 
 @dataclass(frozen=True)
 class Check:
-    """One comparison with the paper, in the paper's unit; its criterion was set before the values.
+    """A comparison with the paper, in the paper's unit; the criterion was set before the values.
 
-    `item` is the section of the report, from 1. A mismatch has a reason, and a match has none: else
-    it raises ValueError.
+    `item` is the section of the report, from 1. Raises ValueError if a mismatch has no reason, or a
+    match has one.
     """
 
     item: int
@@ -41,7 +41,7 @@ class Check:
     why: str = ""
 
     def __post_init__(self) -> None:
-        """Refuse a mismatch without a reason."""
+        """Refuse a mismatch without a reason, or a match with one."""
         if self.matched == bool(self.why):
             raise ValueError(f"{self.name}: a mismatch needs a reason, and a match has none")
 
@@ -54,7 +54,7 @@ def compared(
 
 
 def written(value: float, digits: int = 4) -> str:
-    """Write a number with `digits` digits, without decimals if it is large; nan as a dash."""
+    """Write a number with `digits` digits, without decimals if large; nan as a dash."""
     if not math.isfinite(value):
         return "–"
     if value == 0:
@@ -73,7 +73,7 @@ def within(
     why: str,
     digits: int = 4,
 ) -> Check:
-    """Compare two numbers: they match within a share of the paper's number."""
+    """Compare two numbers, which match within a share of the paper's number."""
     return compared(
         item,
         name,
@@ -91,7 +91,7 @@ def count(checks: Sequence[Check]) -> str:
 
 
 def summary(checks: Sequence[Check]) -> str:
-    """Return one line: the number of matches, and the names of the mismatches."""
+    """Return one line with the number of matches and the names of the mismatches."""
     missed = [check.name for check in checks if not check.matched]
     told = count(checks)
     return f"{told}; not matched: {'; '.join(missed)}." if missed else f"{told}."
@@ -104,7 +104,7 @@ NOTATION = {
     "coulomb_friction": ("F_c", "N"),
     "static_friction": ("F_s", "N"),
 }
-"""Symbol and unit of the parameters of Table 1, in its order."""
+"""Symbol and unit of each parameter in Table 1, in the order of the table."""
 
 TOLERANCES = {
     "mass": 0.1,
@@ -113,9 +113,9 @@ TOLERANCES = {
     "coulomb_friction": 0.05,
     "static_friction": 0.05,
 }
-"""Shares of the paper's value within which a parameter counts as reproduced.
+"""Largest deviation of a reproduced parameter, as a share of the paper's value.
 
-Chosen before the comparison: the scatter of Table 1 between its own two packings, per parameter."""
+Chosen before the comparison: the scatter of Table 1 between its two packings, per parameter."""
 
 
 def parameter_checks(
@@ -125,7 +125,7 @@ def parameter_checks(
     found: dict[str, float],
     reasons: dict[str, str],
 ) -> Iterator[Check]:
-    """Compare each identified with its expected parameter, with the reason of a mismatch."""
+    """Compare identified and expected parameters, with reasons for mismatches."""
     for name, value in found.items():
         symbol, unit = NOTATION[name]
         yield within(
@@ -142,8 +142,8 @@ def parameter_checks(
 
 
 _EXACT = 1e-4
-"""Largest relative error without noise. Chosen: the error of derivatives over 31 samples is
-smaller."""
+"""Largest relative error without noise. Chosen: derivatives over 31 samples have a smaller
+error."""
 
 
 def dead_band_checks(low: BenchResult, high: BenchResult) -> Iterator[Check]:
@@ -164,7 +164,7 @@ def dead_band_checks(low: BenchResult, high: BenchResult) -> Iterator[Check]:
 
 
 def noise_checks(programme: Programme) -> Iterator[Check]:
-    """Compare model 1 without noise with the truth, and the mass's scatter with the paper's."""
+    """Compare noise-free model 1 with the truth, and the scatter of the mass with the paper's."""
     for name, estimate in programme.without_noise.items():
         truth, found = programme.results[name].bench.truth, estimate.values
         errors = {key: abs(found[key] / getattr(truth, key) - 1) for key in NOTATION}
@@ -214,13 +214,13 @@ FIGURES = {
     ("low", "ISA steps"): "Fig. 8",
     ("high", "ISA steps"): "Fig. 9",
 }
-"""Figure of the paper by packing and excitation."""
+"""Figures of the paper by packing and excitation."""
 
 _VISIBLE = 0.1e-3
-"""Distance of two stems, m, that a figure of the whole travel shows: a line's width, 0.35 %."""
+"""Distance of two stems, m, visible in a figure of the whole travel: a line's width, 0.35 %."""
 
 _NEGLIGIBLE = 1e-3
-"""Share of the travel that counts as negligible. Chosen: below the width of a line in a figure."""
+"""Negligible share of the travel. Chosen: less than the width of a line in a figure."""
 
 _GOOD = 0.95
 """Fit of a model that describes the valve. Chosen: Figs. 6 to 9 show both models on the
@@ -228,7 +228,7 @@ measurement."""
 
 
 def validation_checks(programme: Programme) -> Iterator[Check]:
-    """Compare fit and errors of both models on sine and ISA steps."""
+    """Compare fit and errors of both models for sine and ISA steps."""
     for (name, excitation), figure in FIGURES.items():
         yield from _of_figure(programme, name, excitation, figure)
     low, high = (programme.results[name].sine for name in paper.PACKINGS)
@@ -517,19 +517,19 @@ _ORDER = 3
 
 
 _WINDOW = 0.25
-"""Order, and length in s, of the derivative windows. Chosen: short against the 35.5 s of the
+"""Order and length, s, of the derivative windows. Chosen: short compared with the 35.5 s of the
 sine."""
 
 
 _REST = 0.05
-"""Share of the top speed below which the stem counts as resting. Chosen: above its noise."""
+"""Share of the top speed below which the stem is at rest. Chosen: above its noise."""
 
 
 class ForceTerms(NamedTuple):
     """Time since the first sample, s, and the terms of (4) by name, N, shape (n,) each.
 
-    The terms are k·x, F_c·sgn ẋ, F_v·ẋ and m·ẍ, in this order; x counts from the bias of (10), and
-    the sign of a resting stem is 0.
+    The terms are k·x, F_c·sgn ẋ, F_v·ẋ and m·ẍ, in this order. x is measured from the bias of (10),
+    and the sign of a resting stem is 0.
     """
 
     time: NDArray[np.float64]
@@ -539,7 +539,7 @@ class ForceTerms(NamedTuple):
 def force_terms(result: BenchResult) -> ForceTerms:
     """Evaluate the terms for the measured sine with model 1.
 
-    The derivative windows are a quarter of a second long, so that the remaining noise is small.
+    Derivative windows of a quarter of a second keep the remaining noise small.
     """
     recording, model = result.experiments.sine.measured, result.identified.published
     window = round(_WINDOW / recording.sample_period) | 1

@@ -36,7 +36,7 @@ _DRAWINGS = 2
 
 
 def _noise(bench: Bench, options: argparse.Namespace) -> SensorNoise:
-    """Return the configured noise, or what the options say instead."""
+    """Return the configured noise, unless options replace it."""
     if options.seed < 0:
         raise ValueError(f"--seed must not be negative, got {options.seed}")
     given = {
@@ -61,7 +61,7 @@ def _benches(options: argparse.Namespace) -> dict[str, Bench]:
 
 
 def _reproduce(benches: dict[str, Bench], output: Path, progress: Callable[[str], object]) -> str:
-    """Run, draw and write; return what matched."""
+    """Run, draw and write; return a summary of the matches."""
     programme = run_programme(benches, _PLAN, _SEEDS, progress)
     checks = all_checks(programme)
     progress("figures")
@@ -74,7 +74,7 @@ def _reproduce(benches: dict[str, Bench], output: Path, progress: Callable[[str]
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run the programme, and write the report."""
+    """Run the programme and write the report."""
     benches = _benches(options)
     if options.output.exists() and not options.output.is_dir():
         raise ValueError(f"{options.output}: is no folder: give --output another name")

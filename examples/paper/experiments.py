@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Experiments on a bench: one run, the free sweep of the threshold, and the scatter over seeds."""
+"""Experiments on a bench: single runs, the free threshold sweep, and the scatter over seeds."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -61,15 +61,15 @@ def signature_of(result: Result) -> ValveSignature:
 
 
 _REGION = 1.05
-"""Multiple of the least σ_s that bounds the region of the paper's choice. Chosen: the paper gives
-no number."""
+"""Bound of the region of the paper's choice, over the least σ_s. Chosen: the paper gives no
+number."""
 
 
 class FreeSweep(NamedTuple):
     """A sweep of all four parameters of (3), and its chosen step.
 
-    `published_estimate` repeats the regression with an assumed mass where the record does not
-    determine it; here the regressed mass stays.
+    `published_estimate` repeats the regression with an assumed mass if the record does not
+    determine the mass. This sweep keeps the regressed mass.
     """
 
     sweep: Sweep
@@ -93,10 +93,10 @@ class FreeSweep(NamedTuple):
 
     @property
     def region(self) -> tuple[float, float]:
-        """From the least to the largest δv, m/s, with a σ_s within 5 % of the least.
+        """Lowest and highest δv, m/s, with a σ_s within 5 % of the least.
 
-        Where samples are fewer than four derivative windows, σ_s is left out: too few samples are
-        independent.
+        σ_s is ignored where the samples fill fewer than four derivative windows: too few samples
+        are then independent.
         """
         sweep = self.sweep
         usable = np.isfinite(sweep.sigma) & (sweep.samples >= sweep.free * self.window)
@@ -106,7 +106,7 @@ class FreeSweep(NamedTuple):
 
 
 def free_sweep(recording: Recording, valve: Valve, settings: IdentificationSettings) -> FreeSweep:
-    """Sweep (3) to (8) with (17) and (18), nothing assumed."""
+    """Sweep (3) to (8) with (17) and (18), without assumptions."""
     derivatives = differentiate(
         recording.position, recording.sample_period, settings.published_window, settings.order
     )
@@ -121,7 +121,7 @@ def free_sweep(recording: Recording, valve: Valve, settings: IdentificationSetti
 
 
 TRIANGLE = TriangleWave(pressure_at(0.1), pressure_at(0.8), 42.0)
-"""Triangle of the signature: the slope of the whole range in 60 s a period, without travel
+"""Triangle of the signature: slope as for the whole range in periods of 60 s, clear of the travel
 stops."""
 
 SINE = SineWave()
@@ -133,7 +133,7 @@ ISA = IsaSteps()
 
 @dataclass(frozen=True)
 class Plan:
-    """Periods of each wave, and the step sequence, which is recorded completely."""
+    """Number of periods per wave, and the step sequence, which is recorded completely."""
 
     square_periods: float = 6.0
     triangle_periods: float = 3.5
@@ -143,7 +143,7 @@ class Plan:
 
 @dataclass(frozen=True, eq=False)
 class Experiment:
-    """Commanded pressure (Pa, shape (n,)), the true motion, and the motion with sensor noise."""
+    """Commanded pressure, Pa, shape (n,), with the true motion and the noisy measurement."""
 
     command: NDArray[np.float64] = field(repr=False)
     clean: Recording
@@ -174,7 +174,7 @@ def run(bench: Bench, excitation: Excitation, duration: float, number: int = 0) 
 def stem_error(
     bench: Bench, experiment: Experiment, model: KarnoppParameters
 ) -> NDArray[np.float64]:
-    """Return the stem of a model minus the true stem, both under the true pressure, m."""
+    """Return the simulated minus the true stem position, m, both under the true pressure."""
     clean = experiment.clean
     start = StemState(float(clean.position[0]))
     stem = simulate(bench.valve, model, clean.pressure, clean.sample_period, start)
@@ -207,13 +207,13 @@ NOISE_LEVELS = (
 
 _SCATTERED = ("mass", "viscous_friction", "coulomb_friction", "spring_constant")
 _SEED_STEP = 1000
-"""Distance of the seeds of two repetitions: larger than the number of experiments on a bench."""
+"""Seed increment per repetition: larger than the number of experiments on a bench."""
 
 
 class Level(NamedTuple):
-    """Mean and standard deviation over the seeds of what model 1 estimates, by parameter.
+    """Mean and standard deviation, over the seeds, of each parameter of model 1.
 
-    All as regressed at the chosen δv; so is the mass, even where the record does not determine it.
+    All are regressed at the chosen δv, including a mass that the record does not determine.
     """
 
     packing: str
@@ -223,7 +223,7 @@ class Level(NamedTuple):
 
 
 class Rivals(NamedTuple):
-    """rms errors against the stem without noise, m, one a seed, of model 1 and of model 2."""
+    """Rms errors of models 1 and 2 against the noise-free stem, m, one per seed."""
 
     packing: str
     excitation: str
@@ -232,19 +232,19 @@ class Rivals(NamedTuple):
 
     @property
     def wins(self) -> int:
-        """Count the seeds in which model 1 came closer."""
+        """Number of seeds in which model 1 is closer."""
         return sum(one < two for one, two in zip(self.model_1, self.model_2, strict=True))
 
 
 @dataclass(frozen=True)
 class Scatter:
-    """Scatter of the estimates by level of noise, and the two models by seed."""
+    """Scatter of the estimates per noise level, and errors of the two models per seed."""
 
     levels: tuple[Level, ...]
     rivals: tuple[Rivals, ...]
 
     def level(self, packing: str, noise: SensorNoise) -> Level:
-        """Return the level with this noise, whatever its seed."""
+        """Return the level with this noise, for any seed."""
         wanted = (packing, noise.position, noise.pressure)
         return next(
             one
@@ -253,12 +253,12 @@ class Scatter:
         )
 
     def of(self, packing: str, excitation: str) -> Rivals:
-        """Return the two models of one packing on one excitation."""
+        """Return the errors of both models for a packing and an excitation."""
         return next(one for one in self.rivals if one[:2] == (packing, excitation))
 
 
 def _seeded(bench: Bench, noise: SensorNoise, number: int) -> Bench:
-    """Return the bench with other random numbers than its own experiments."""
+    """Return the bench with random numbers that its own experiments do not use."""
     return bench.with_noise(replace(noise, seed=bench.noise.seed + _SEED_STEP * (number + 1)))
 
 
@@ -317,7 +317,7 @@ def _rivals(bench: Bench, plan: Plan, seeds: int) -> list[Rivals]:
 
 
 def _levels_with(own: SensorNoise) -> list[SensorNoise]:
-    """Return the levels to compare, with the bench's own among them, in increasing order."""
+    """Return the noise levels to compare, including the bench's own, in increasing order."""
     levels = {(one.position, one.pressure) for one in (*NOISE_LEVELS, own)}
     return [SensorNoise(*level) for level in sorted(levels)]
 
@@ -325,7 +325,7 @@ def _levels_with(own: SensorNoise) -> list[SensorNoise]:
 def measure_scatter(
     benches: Sequence[Bench], plan: Plan, seeds: int, progress: Callable[[str], object]
 ) -> Scatter:
-    """Repeat the identification with other noise, at several levels and at the bench's own."""
+    """Repeat the identification with other noise, at several levels including the bench's own."""
     levels, rivals = [], []
     for bench in benches:
         progress(f"{bench.name}: scatter by noise")

@@ -55,7 +55,7 @@ def _draw_pressure(axes: Axes, experiment: Experiment, duration: float) -> None:
 
 
 def excitations_figure(result: BenchResult) -> Figure:
-    """Draw the four excitations, before and behind the V/P converter."""
+    """Draw the four excitations before and after the V/P converter."""
     figure = new_figure(6.2)
     panels = figure.subplots(2, 2)
     experiments = result.experiments
@@ -100,7 +100,7 @@ def input_output_figure(low: BenchResult, high: BenchResult) -> Figure:
 
 
 def signatures_figure(*results: BenchResult) -> Figure:
-    """Draw Fig. 2: valve signatures, with P1, P2 and the dead zone of each."""
+    """Draw Fig. 2: valve signatures with their P1, P2 and dead zones."""
     figure = new_figure(5.4)
     axes = figure.subplots()
     for result, colour in zip(results, COLOURS, strict=False):
@@ -128,7 +128,7 @@ def signatures_figure(*results: BenchResult) -> Figure:
 
 
 def _draw_dead_zone(axes: Axes, result: BenchResult, colour: str) -> None:
-    """Draw an arrow across the loop in the middle of its height, as wide as the dead zone."""
+    """Draw an arrow as wide as the dead zone across the loop, near mid-height."""
     signature = result.identified.signature
     position = result.experiments.triangle.measured.position
     height = 0.5 * float(position.min() + position.max())
@@ -167,11 +167,11 @@ def force_terms_figure(result: BenchResult) -> Figure:
 
 _SWEPT = ("mass", "viscous_friction", "coulomb_friction", "spring_constant")
 _SHOWN = (2.0, 98.0)
-"""Percentiles of an estimate at the ends of the axis; the extremes are far outside."""
+"""Percentiles of an estimate at the ends of the axis; extremes lie far outside."""
 
 
 def _mark(axes: Axes, result: BenchResult) -> None:
-    """Mark the region of the least σ_s, the chosen δv, and the paper's choice."""
+    """Mark the region of the least σ_s, the chosen δv and the paper's choice."""
     free = result.identified.free
     axes.axvspan(*free.region, color=COLOURS[2], alpha=0.2, lw=0, label="σ_s within 5 % of least")
     axes.axvline(free.threshold, color=COLOURS[2], lw=1.5, label="chosen here")
@@ -204,7 +204,7 @@ def estimates_figure(result: BenchResult) -> Figure:
 
 
 def quality_figure(result: BenchResult) -> Figure:
-    """Draw Fig. 4: σ_s and R²_s over δv, and how many samples are left."""
+    """Draw Fig. 4: σ_s and R²_s over δv, and the number of remaining samples."""
     figure = new_figure(6.4)
     panels = figure.subplots(3, 1, sharex=True, height_ratios=[1.3, 1.3, 1])
     sweep = result.identified.free.sweep
@@ -262,7 +262,7 @@ Pictures = Mapping[str, Picture]
 
 
 def draw_figures(programme: Programme) -> Pictures:
-    """Draw every figure, with captions, by the name of its file."""
+    """Draw all figures with captions, by file name."""
     low, high, graphite = (programme.results[name] for name in (*paper.PACKINGS, "graphite"))
     figures: dict[str, tuple[Figure, str]] = {
         "excitations": (

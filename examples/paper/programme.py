@@ -56,12 +56,12 @@ _ROUNDING = 5e-6
 
 @dataclass(frozen=True, eq=False)
 class Identified:
-    """The result of each method on the records of one bench.
+    """The result of each method for the records of one bench.
 
     Model 1 is the sweep of the square wave with x̄ = `position_bias` (m): `published`, and `free`
-    with the mass as it is regressed, for Figs. 3 and 4. Model 2 is the `force_balance` of the
-    triangle. `simulated` is that of the method ``bench``, which takes F_0 for a parameter in place
-    of x̄, with the nominal mass fixed.
+    with the regressed mass, for Figs. 3 and 4. Model 2 is the `force_balance` of the triangle.
+    `simulated` is the result of the method ``bench``, which estimates F_0 in place of x̄, with the
+    nominal mass fixed.
     """
 
     position_bias: float
@@ -77,7 +77,7 @@ class Identified:
 
     @property
     def top_speed(self) -> float:
-        """|ẋ|max of (8), m/s, as the derivatives show it."""
+        """|ẋ|max of (8), m/s, from the derivatives."""
         first = self.free.sweep.thresholds[0]
         return float(first * self.published.settings.resolution)
 
@@ -92,9 +92,9 @@ class Identified:
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """A model compared with the measured stem, and with the stem without sensor noise.
+    """A model compared with the measured stem and with the noise-free stem.
 
-    `error` is the stem of the model minus the true stem, both under the true pressure, m, shape
+    `error` is the simulated minus the true stem position, both under the true pressure, m, shape
     (n,).
     """
 
@@ -114,11 +114,11 @@ class Comparison:
 
 @dataclass(frozen=True, eq=False)
 class BenchResult:
-    """All results on one bench.
+    """All results for one bench.
 
-    `sine` and `isa` are validations by model: those of `Identified.models`, and of the paper's
-    packings also "model 1, DV 1 %" and "paper's model 2", the numbers of Table 1. `steps` has input
-    and position in percent of their spans.
+    `sine` and `isa` are validations by model: the models of `Identified.models` and, for the
+    paper's packings, also "model 1, DV 1 %" and "paper's model 2", the numbers of Table 1. `steps`
+    has input and position in percent of their spans.
     """
 
     bench: Bench
@@ -130,7 +130,7 @@ class BenchResult:
 
 
 class MassByBias(NamedTuple):
-    """A mass, kg, as the sweep regresses it with a bias x̄, m."""
+    """The mass, kg, that the sweep regresses with a bias x̄, m."""
 
     position_bias: float
     mass: float
@@ -140,9 +140,9 @@ class MassByBias(NamedTuple):
 class Programme:
     """All results of the programme, by bench.
 
-    `without_noise` is model 1 of the paper's packings without any noise, `mass_by_bias` the mass of
-    the packing "low" without noise, with x̄ at either end and in the middle of what rounds to the
-    same 0.01 mm.
+    `without_noise` is the noise-free model 1 of the paper's packings. `mass_by_bias` is the
+    noise-free mass of the packing "low", with x̄ at both ends and in the middle of the range that
+    rounds to the same 0.01 mm.
     """
 
     results: Mapping[str, BenchResult]
@@ -152,7 +152,7 @@ class Programme:
 
 
 def rounded_bias(*biases: float) -> float:
-    """Return the mean of x̄, m, each rounded to 0.01 mm as the paper does it in (16)."""
+    """Return the mean of x̄, m, each rounded to 0.01 mm as in (16) of the paper."""
     return round(sum(round(bias, 5) for bias in biases) / len(biases), 6)
 
 
@@ -162,7 +162,7 @@ def identified(
     force_balance: Result,
     position_bias: float,
 ) -> Identified:
-    """Identify the square wave: model 1 with x̄ from the triangle, and by simulation."""
+    """Identify from the square wave: model 1 with x̄ from the triangle, and by simulation."""
     settings = IdentificationSettings(position_bias=position_bias, assumed_mass=bench.assumed_mass)
     square = experiments.square.measured
     return Identified(
@@ -228,11 +228,11 @@ def run_programme(
     seeds: int,
     progress: Callable[[str], object] = lambda _: None,
 ) -> Programme:
-    """Run the whole programme on the benches by name, the paper's two packings among them.
+    """Run the whole programme on the benches, which include the paper's two packings.
 
-    x̄ is shared between these two, as in the paper. With `seeds` repetitions of other noise the
-    scatter is estimated. `progress` is called with the name of the next step. Raises RefusalError
-    or ValueError, which names the method, if the noise hides what a method needs.
+    These two share x̄, as in the paper. `seeds` repetitions with other noise give the scatter.
+    `progress` is called with the name of the next step. Raises RefusalError or ValueError, with the
+    name of the method, if noise hides a feature that the method needs.
     """
     experiments, balances = {}, {}
     for name, bench in benches.items():

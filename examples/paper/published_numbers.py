@@ -23,7 +23,7 @@ NOMINAL_MASS = 1.6
 """Mass of the moving parts, kg (section 4)."""
 
 POSITION_BIAS = 1.13e-3
-"""x̄ that the paper estimates with, m: the mean of (16)."""
+"""x̄ for the paper's estimates, m: the mean of (16)."""
 
 SIGNATURE_SPRING = MappingProxyType({"low": 2.0293e5, "high": 2.0391e5})
 """k of (15) in (16), N/m."""
@@ -32,10 +32,10 @@ SIGNATURE_BIAS = MappingProxyType({"low": 1.12e-3, "high": 1.14e-3})
 """x̄ of (14) in (16), m."""
 
 DEAD_ZONE_RATIO = 3.0
-"""Least ratio of the dead zones, high over low (Fig. 2)."""
+"""Lower bound of the ratio of the dead zones, high over low (Fig. 2)."""
 
 CHOSEN_THRESHOLD = 0.01
-"""δv around which the paper chooses, m/s (Figs. 3 and 4)."""
+"""Approximate δv chosen by the paper, m/s (Figs. 3 and 4)."""
 
 VARIANCE_THRESHOLD = 0.012
 """δv above which the estimates scatter, m/s (Fig. 3)."""

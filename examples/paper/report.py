@@ -22,7 +22,7 @@ from valve_friction_ros.reports import Block, Column, Page, PageTable, Paragraph
 
 
 def check_table(checks: Sequence[Check], caption: str = "") -> PageTable:
-    """List checks; mismatches are marked, with their reasons."""
+    """List checks, with mismatches marked and explained."""
     rows = tuple(
         (
             "✓" if one.matched else "✗",
@@ -39,7 +39,7 @@ def check_table(checks: Sequence[Check], caption: str = "") -> PageTable:
 
 
 def signature_table(results: Sequence[BenchResult]) -> PageTable:
-    """Show k, x̄ and dead zone of valve signatures with standard errors."""
+    """Show k, x̄ and dead zone of the valve signatures, with standard errors."""
     rows = []
     for one in results:
         signature = one.identified.signature
@@ -144,7 +144,7 @@ def validation_table(models: Mapping[str, Comparison], caption: str) -> PageTabl
 
 
 def rivals_table(programme: Programme) -> PageTable:
-    """Show the rms errors of both models over the seeds."""
+    """Show the range of the rms errors of both models over the seeds."""
     rows = tuple(
         (
             one.packing,
@@ -168,7 +168,7 @@ def rivals_table(programme: Programme) -> PageTable:
 
 
 def noise_table(programme: Programme) -> PageTable:
-    """Show mean and deviation of model 1 by level of noise."""
+    """Show mean and standard deviation of model 1 per noise level."""
     rows = tuple(
         (
             one.packing,
@@ -220,7 +220,7 @@ def _step_row(step: StepMetrics) -> tuple[str, ...]:
 
 
 def step_summary_table(results: Sequence[BenchResult]) -> PageTable:
-    """Show dead band and resolution of the ISA test, and the dead band that friction predicts."""
+    """Show dead band and resolution from the ISA test, and the dead band expected from friction."""
     rows = []
     for one in results:
         expected = 2 * one.bench.truth.static_friction / one.bench.valve.force_per_drive
