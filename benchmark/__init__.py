@@ -7,10 +7,10 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The full check of what an identification must reach: `make accuracy`."""
+"""The full check of the accuracy requirements of an identification: `make accuracy`."""
 
 import os
 
-# One process a core is enough; more threads would only wait for each other.
+# One process per core is enough; more threads would only wait for each other.
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"):
     os.environ.setdefault(_name, "1")

@@ -52,19 +52,19 @@ _WIDTH_OF_A_FILE = 150
 
 @dataclass
 class Results:
-    """What the parts of the benchmark brought.
+    """Results of all parts of the benchmark.
 
     Attributes
     ----------
     outcomes, coverage, default : list of Outcome
-        Of the cases and of the records for the coverage, by the method ``bench``, and of the main
+        Outcomes of the cases and of the coverage records by the method ``bench``, and of the main
         noise at 1 kHz by the default method.
     alarms : AlarmCounts or None
-        Of the two valves that are watched.
+        Alarms of the two monitored valves.
     bounds : list of Bound
-        All that was checked.
+        All requirements that were checked.
     information : list of Information
-        What any method could reach on the square wave.
+        Best accuracy that any method could reach on the square wave.
     seconds : dict of str to float
         Median time of one identification, by valve and method.
     """
@@ -113,7 +113,7 @@ def _seeds_of(case: Case, options: argparse.Namespace) -> int:
 def _in_parallel(
     title: str, work: Callable[..., Any], tasks: Sequence[Any], jobs: int, console: Console
 ) -> list[Any]:
-    """Do all tasks in `jobs` processes, in order, with a progress bar."""
+    """Run all tasks in `jobs` processes, with results in order and a progress bar."""
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),
@@ -215,7 +215,7 @@ _RUNS: Mapping[str, Callable[[Results, argparse.Namespace, Console], None]] = {
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the parts that were asked for; return 1 if a bound is missed."""
+    """Run the requested parts; return 1 if a bound is missed."""
     parser = _parser()
     options = parser.parse_args(arguments)
     if not options.output.parent.is_dir():

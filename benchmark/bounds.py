@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""What an identification must reach, checked on the outcomes."""
+"""Accuracy requirements of an identification, checked on the outcomes."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -49,11 +49,11 @@ PUBLISHED = {
     "coulomb_friction": 20.3935,
     "spring_preload": -3.1648,
 }
-"""IDIM-LS values of the data set's authors."""
+"""IDIM-LS values by the authors of the data set."""
 
 
 def emps_bounds() -> list[Bound] | None:
-    """Identify EMPS with default settings and no spring; None where the record is absent."""
+    """Identify EMPS with default settings and no spring; return None without its record."""
     if not RECORD.is_file():
         return None
     time, force, position = np.loadtxt(RECORD, delimiter=",", skiprows=1, unpack=True)
@@ -73,7 +73,7 @@ def emps_bounds() -> list[Bound] | None:
 
 
 GROWTH = 1.5
-"""Friction of the valve whose packing was tightened, over that of the unchanged one."""
+"""Friction of the valve with tightened packing, over that of the unchanged valve."""
 
 _BASELINE_SEED = 1_000_000
 
@@ -87,7 +87,7 @@ class Diagnosed:
     side : str
         "high" or "low" for an alarm, else empty.
     ratio : float
-        Friction over the baseline; nan where none was identified.
+        Friction over the baseline; nan if no friction was identified.
     """
 
     side: str
@@ -96,7 +96,7 @@ class Diagnosed:
 
 @dataclass(frozen=True)
 class AlarmCounts:
-    """All identifications of the two valves.
+    """Alarms and ratios of the two valves.
 
     Attributes
     ----------
@@ -105,7 +105,7 @@ class AlarmCounts:
     declared : list of bool
         Whether growth was declared, for each pair of identifications.
     ratios : tuple of list of float
-        Friction over the baseline, of either valve.
+        Friction over the baseline, for each valve.
     """
 
     unchanged: list[str]
@@ -134,7 +134,7 @@ def _baseline() -> Baseline:
 
 
 def diagnosed(growth: float, seed: int) -> Diagnosed:
-    """Identify a valve with its friction grown, and diagnose it by the unchanged one."""
+    """Identify a valve with grown friction, and compare it with the unchanged valve."""
     try:
         result = _identified(growth, seed)
     except RefusalError:
@@ -149,7 +149,7 @@ def diagnosed(growth: float, seed: int) -> Diagnosed:
 
 
 COVERAGE = (0.90, 0.99)
-"""Shares of the records between which a 95 % interval covers the truth."""
+"""Required range of the share of records whose 95 % interval covers the truth."""
 
 FORCE_BOUND = 0.05
 
@@ -164,7 +164,7 @@ _LEAST_DECLARED = 0.99
 
 
 def by_case(outcomes: Sequence[Outcome]) -> dict[Case, list[Outcome]]:
-    """Group outcomes by their case, in the order of the first of each."""
+    """Group outcomes by case, in order of first occurrence."""
     groups: dict[Case, list[Outcome]] = {}
     for outcome in outcomes:
         groups.setdefault(outcome.case, []).append(outcome)
@@ -172,14 +172,14 @@ def by_case(outcomes: Sequence[Outcome]) -> dict[Case, list[Outcome]]:
 
 
 def worst(outcomes: Sequence[Outcome], name: str) -> float:
-    """Largest error of a parameter over those records that answered; nan if none did."""
+    """Return the largest error of a parameter over the records with a value; nan without any."""
     errors = [abs(outcome.errors.get(name, np.nan)) for outcome in outcomes]
     known = [error for error in errors if not np.isnan(error)]
     return max(known) if known else float("nan")
 
 
 def coverage_of(outcomes: Sequence[Outcome], name: str) -> tuple[float, int]:
-    """Share of intervals that hold the truth, and how many intervals there were."""
+    """Return the share of intervals that cover the truth, and the number of intervals."""
     held = [
         abs(outcome.errors[name]) <= outcome.half_widths[name]
         for outcome in outcomes
@@ -193,7 +193,7 @@ def _title(case: Case) -> str:
 
 
 def _all_within(outcomes: Sequence[Outcome], name: str, bound: float) -> Bound:
-    """Require an answer in every record, within the bound."""
+    """Require a value within the bound for every record."""
     errors = np.array([abs(outcome.errors.get(name, np.nan)) for outcome in outcomes])
     within = int(np.count_nonzero(errors <= bound))
     what = f"{_title(outcomes[0].case)}: {name} within {bound:.1%}"
@@ -219,7 +219,7 @@ def _slips(case: Case) -> bool:
 
 
 def _force_bound(outcomes: Sequence[Outcome]) -> list[Bound]:
-    """Bound the friction force, wherever an answer was given and not withheld."""
+    """Bound the friction force wherever F_c was not withheld."""
     case = outcomes[0].case
     hard = not case.plant.is_karnopp or case.condition == "100 Hz" or case.excitation[:2] == "in"
     withheld = Verdict.NOT_IDENTIFIABLE.value
@@ -266,13 +266,13 @@ def case_bounds(outcomes: Sequence[Outcome]) -> list[Bound]:
 
 
 def default_bounds(outcomes: Sequence[Outcome]) -> list[Bound]:
-    """Check that the default method claims nothing wrong in one case."""
+    """Check that the default method makes no wrong claim in one case."""
     bounds = [bound for check in (_claims, _mass) for bound in check(outcomes)]
     return [replace(bound, what=f"default method, {bound.what}") for bound in bounds]
 
 
 def coverage_bounds(outcomes: Sequence[Outcome]) -> list[Bound]:
-    """Check the coverage of each parameter that has a true value in one case."""
+    """Check the coverage of each parameter with a true value in one case."""
     case = outcomes[0].case
     names = ["coulomb_friction", "viscous_friction", "spring_constant", "spring_preload"]
     if _slips(case):
@@ -287,7 +287,7 @@ def coverage_bounds(outcomes: Sequence[Outcome]) -> list[Bound]:
 
 
 def alarm_bounds(counts: AlarmCounts) -> list[Bound]:
-    """Check false alarms on either side, and friction that has grown."""
+    """Check false alarms on both sides, and the detection of grown friction."""
     identifications, pairs = len(counts.unchanged), len(counts.declared)
     bounds = []
     for side in ("high", "low"):

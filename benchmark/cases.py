@@ -38,7 +38,7 @@ from valve_friction_ros.model.excitations import pressure_at
 Motion = Callable[["Plant", NDArray[np.float64], float], NDArray[np.float64]]
 
 BRISTLE_STIFFNESS = 942.4 / 20e-6
-"""σ_0 of the LuGre valve, N/m: its stem creeps 20 µm before it breaks away."""
+"""σ_0 of the LuGre valve, N/m: the stem creeps 20 µm before breakaway."""
 
 _SUBSTEPS = 100
 
@@ -80,9 +80,9 @@ def _step_lugre(
     damping: float,
     travel: float,
 ) -> NDArray[np.float64]:
-    """LuGre friction, ż = v − σ_0·|v|/g(v)·z, by linearly implicit steps (Canudas de Wit, 1995).
+    """Step LuGre friction, ż = v − σ_0·|v|/g(v)·z, linearly implicitly (Canudas de Wit, 1995).
 
-    The travel stops take the stem's whole speed.
+    Impact on a travel stop is perfectly inelastic.
     """
     positions = np.empty_like(forces)
     position, velocity, bristle = min(max(forces[0] / spring, 0.0), travel), 0.0, 0.0
@@ -119,9 +119,9 @@ class Plant:
     parameters : KarnoppParameters
         Its true friction, spring and mass.
     motion : callable
-        Function of the plant, pressure (Pa) and sample period (s): stem position, m.
+        Function of plant, pressure (Pa) and sample period (s) that returns the stem position, m.
     is_karnopp : bool
-        Whether its friction is the published model's.
+        Whether the friction follows the published model.
     """
 
     name: str
@@ -131,7 +131,7 @@ class Plant:
     is_karnopp: bool = True
 
     def respond(self, pressure: NDArray[np.float64], period: float) -> NDArray[np.float64]:
-        """Stem position in m under `pressure` (Pa) sampled every `period` (s)."""
+        """Return the stem position, m, under `pressure`, Pa, sampled every `period`, s."""
         return self.motion(self, pressure, period)
 
 
@@ -147,7 +147,7 @@ PLANTS = {
         Plant("lugre", GRAPHITE_VALVE, _FALLING, _lugre, is_karnopp=False),
     )
 }
-"""By name: the paper's valve in two states, graphite with slip jump, and beyond Karnopp."""
+"""Plants by name: the paper's valve in two states, graphite with slip jump, two beyond Karnopp."""
 
 
 PERIOD = 1e-3
@@ -164,7 +164,7 @@ NOISES = {
 
 @dataclass(frozen=True)
 class Condition:
-    """How the sensors sample: every `stride` ms, with 12 bits or without quantisation."""
+    """Sampling of the sensors: every `stride` ms, with 12 bits or unquantised."""
 
     name: str
     stride: int
@@ -180,7 +180,7 @@ class Condition:
 
 
 def _quantised(values: NDArray[np.float64], span: float) -> NDArray[np.float64]:
-    """Round to the codes of a 12-bit converter from 0 to `span`."""
+    """Round to the codes of a 12-bit converter with the range 0 to `span`."""
     unit = span / 2**12
     rounded: NDArray[np.float64] = np.round(values / unit) * unit
     return rounded
@@ -190,14 +190,15 @@ CONDITIONS = {
     "1 kHz": Condition("1 kHz", 1, quantised=False),
     "100 Hz": Condition("100 Hz", 10, quantised=True),
 }
-"""Sampling by name; the slow one has 12 bits."""
+"""Sampling by name; the slow sampling has 12 bits."""
 
 
 def _in_service(time: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Move by ±3 % of the range every 4 s around mid-range, as a controller makes them.
+    """Return steps of ±3 % of the range every 4 s around mid-range, like those of a controller.
 
-    A random walk; of most such walks the stem of a tight packing follows one way only, which is
-    refused. This seed moves the graphite valve 4 mm up and 5 mm down.
+    The steps are a random walk. In most such walks the stem of a tight packing moves in one
+    direction only, and the record is refused. This seed moves the graphite valve 4 mm up and 5 mm
+    down.
     """
     steps = np.random.default_rng(138).choice([-0.03, 0.03], int(time[-1] / 4) + 1)
     levels = 0.5 + np.clip(np.cumsum(steps), -0.3, 0.3)
@@ -215,7 +216,7 @@ EXCITATIONS = {
 
 @cache
 def clean_record(plant_name: str, excitation: str) -> Recording:
-    """Return the record of perfect sensors at 1 kHz."""
+    """Return the record from perfect sensors at 1 kHz."""
     command, duration = EXCITATIONS[excitation]
     time = np.arange(round(duration / PERIOD)) * PERIOD
     pressure = converter_response(command(time), PERIOD)
@@ -224,7 +225,7 @@ def clean_record(plant_name: str, excitation: str) -> Recording:
 
 @dataclass(frozen=True)
 class Case:
-    """One combination of everything, by name."""
+    """One combination of plant, excitation, noise and sampling, by name."""
 
     plant_name: str
     excitation: str
@@ -237,7 +238,7 @@ class Case:
         return PLANTS[self.plant_name]
 
     def record(self, seed: int) -> Recording:
-        """Return the record as the sensors see it, reproducible by its seed."""
+        """Return the measured record, reproducible by its seed."""
         noise = NOISES[self.noise]
         seeded = SensorNoise(noise.position, noise.pressure, seed)
         noisy = seeded.applied_to(clean_record(self.plant_name, self.excitation))

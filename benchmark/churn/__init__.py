@@ -7,4 +7,4 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Nodes that stream while clients, and whole participants, come and go by the thousands."""
+"""Streaming nodes while thousands of clients and DDS participants come and go."""

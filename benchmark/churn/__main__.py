@@ -27,20 +27,20 @@ from benchmark.harness.rows import Row
 from benchmark.harness.run import Ledger, endured, run_parser
 
 _PAUSE = 1.2
-"""Mean time between two visitors that come, s."""
+"""Mean time between arrivals of visitors, s."""
 _KILLED = 0.3
-"""Share of the visitors that are killed in the midst of something."""
+"""Share of visitors that are killed at a random instant."""
 _LONGEST_LIFE = 5.0
-"""Time, s, within which they are."""
+"""Longest time until they are killed, s."""
 _VISIT_LIMIT = 120.0
-"""Time, s, after which a visitor hangs."""
+"""Time, s, after which a visitor is considered hung."""
 _ENDING_PAUSE = 10.0
 _FIRST_SECONDS = 3.0
 _LONGEST_RUN = 12.0
 
 
 def _forked(work: Callable[[], None], ledger: Ledger, name: str) -> int:
-    """Do some work in a child of this process; return its number."""
+    """Run some work in a forked child; return its process ID."""
     child = os.fork()
     if child:
         return child
@@ -55,7 +55,7 @@ def _forked(work: Callable[[], None], ledger: Ledger, name: str) -> int:
 
 
 def _endings(ledger: Ledger, folder: Path, seed: int, seconds: float) -> None:
-    """Start one node after the other, and end it at any time, often in its first seconds."""
+    """Start nodes in turn, and end each at a random time, often in its first seconds."""
     chance, until, number = random.Random(seed), time.monotonic() + seconds, 0
     kinds = nodes(folder, "/fv_301", ("/fv_401", "/fv_402"))
     while time.monotonic() < until:
@@ -76,21 +76,21 @@ def _endings(ledger: Ledger, folder: Path, seed: int, seconds: float) -> None:
 
 
 class Crowd:
-    """Who comes and goes.
+    """The visitors that come and go.
 
-    The process that holds it must not start ROS itself: it is forked again and again.
+    Its process must not start ROS itself, because it is forked repeatedly.
     """
 
     def __init__(self, ledger: Ledger, seed: int, at_once: int) -> None:
         self._ledger, self._at_once = ledger, at_once
         self._chance = random.Random(seed)
         self._visitors: dict[int, tuple[float, bool]] = {}
-        """Visitors that are there: until when, and whether they are killed then."""
+        """Present visitors: end of the visit, and whether they are killed then."""
         self._others: list[int] = []
         self._count, self._next = 0, 0.0
 
     def begin(self, folder: Path, seconds: float) -> None:
-        """Let the auditor come, and who ends nodes."""
+        """Start the auditor, and the process that ends nodes."""
         seed = self._chance.randrange(2**31)
         works = {
             "audit": lambda: audit(self._ledger, seconds),
@@ -99,7 +99,7 @@ class Crowd:
         self._others = [_forked(work, self._ledger, name) for name, work in works.items()]
 
     def turn(self) -> None:
-        """Kill whom it is time for, see who has gone, and let others come."""
+        """Kill visitors that are due, note those that have left, and start others."""
         now = time.monotonic()
         for child, (until, is_killed) in list(self._visitors.items()):
             ended, status = os.waitpid(child, os.WNOHANG)
@@ -129,7 +129,7 @@ class Crowd:
         self._visitors[child] = now + life, is_killed
 
     def end(self, patience: float = _VISIT_LIMIT) -> None:
-        """Wait until the auditor and the others are done; kill who does not go."""
+        """Wait until all processes are done; kill those that remain."""
         until = time.monotonic() + patience
         children = [*self._visitors, *self._others]
         self._visitors, self._others = {}, []
@@ -145,14 +145,14 @@ _TURN = 0.05
 _LOOK = 10.0
 _SETTLED = 60.0
 _HANG = 30.0
-"""Time, s, in which a node that gives no answers may still end itself."""
+"""Time, s, for a node that no longer answers to end itself."""
 _FROZEN = 1
 """Exit code of a node that has ended itself because it was frozen."""
 _SHARED_MEMORY = Path("/dev/shm")  # noqa: S108 - where Fast DDS has its files
 
 
 def _shared_memory() -> tuple[int, float]:
-    """Return the number of Fast DDS's files and what they hold, MB."""
+    """Return number and total size, MB, of the files of Fast DDS."""
     sizes = []
     for file in _SHARED_MEMORY.glob("*fastrtps*"):
         with contextlib.suppress(FileNotFoundError):
@@ -169,7 +169,7 @@ class _Plant:
         self.processes[name] = Process(nodes(self._folder)[name], self._folder / f"{name}.log")
 
     def watch(self, seconds: float, crowd: Crowd) -> None:
-        """Let the crowd come and go until the time is over or a node has died."""
+        """Let the crowd come and go until the time is up or a node has died."""
         self._ledger.add("run", seconds=seconds)
         begin = next_look = time.monotonic()
         first = dict(self.processes)
@@ -202,10 +202,10 @@ class _Plant:
         )
 
     def _have_died(self) -> bool:
-        """Note the nodes that are gone, and those that hang, with their stacks in their logs.
+        """Note dead and hung nodes; hung nodes write their stacks to their logs.
 
-        A node that has ended itself, because it or its middleware was frozen, is started again, as
-        launch and systemd do.
+        A node that has ended itself because it or its middleware was frozen is restarted, as launch
+        and systemd do.
         """
         for service in hung_services(self._ledger.events(), time.time() - _HANG):
             hung = self.processes[process_of(service)]
@@ -221,7 +221,7 @@ class _Plant:
         return any(code not in (None, _FROZEN) for code in codes.values())
 
     def end(self, seconds: float) -> None:
-        """End the nodes after some seconds, by either signal in turn."""
+        """End the nodes after some seconds, by SIGINT and SIGTERM in turn."""
         for number, (name, process) in enumerate(self.processes.items()):
             if process.exit_code() is None:
                 took = process.end((signal.SIGINT, signal.SIGTERM)[number % 2])

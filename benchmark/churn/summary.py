@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The events of a run as rows with their goals."""
+"""The events of a run as rows with goals."""
 
 import itertools
 import math
@@ -22,18 +22,17 @@ from benchmark.harness.rows import Row, none, some, under
 from benchmark.harness.run import Events, by_kind
 
 _END_LIMIT = 3.0
-"""Time, s, within which a node ends when it is told to."""
+"""Longest time for a node to end after a signal, s."""
 _SILENCE_LIMIT = 5.0
 _LOOKED_AT, _LATE = 0.95, 60.0
-"""Share of the stream to be looked at, without its first and last seconds."""
+"""Share of the stream to examine, and time excluded at its ends, s."""
 
 
 def hung_services(events: Events, until: float = math.inf) -> list[str]:
-    """Return the services without an answer whose process has answered nobody else meanwhile.
+    """Return unanswered services whose process has answered no other client meanwhile.
 
-    Those that were found `until` a time count, s since 1970.
-
-    One client may lose its answers; a node that hangs answers none.
+    Only services reported before `until`, s since 1970, are included. A single client may lose its
+    answers; a hung node answers none.
     """
     answered: dict[str, float] = {}
     for one in events:
@@ -93,7 +92,7 @@ def _endings(endings: Events) -> Iterator[Row]:
 
 
 def rows(events: Events) -> Iterator[Row]:
-    """Count what happened, and compare it with what is promised."""
+    """Count the events, and compare them with the goals."""
     of = by_kind(events)
     ends = Counter(one["end"] for one in of["visit"])
     visits = sum(ends.values())

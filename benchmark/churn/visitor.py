@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Participants that come, ask, listen and go, politely or not; one of them, an auditor, stays."""
+"""Participants that come, call, listen and leave, cleanly or not; and an auditor that stays."""
 
 import os
 import random
@@ -32,12 +32,12 @@ from benchmark.harness.processes import node, parameters
 from benchmark.harness.run import Ledger, Participant
 
 RATE = 250
-"""Samples a second of each signal, Hz: visitors that listen cost more than the nodes."""
+"""Sampling rate of each signal, Hz; low, since listening visitors cost more than the nodes."""
 
 BENCH = Path(__file__).resolve().parents[2] / "config" / "bench_low.yaml"
 _VALVE = "/fv_101"
 AUDITED = f"{_VALVE}/identifier"
-"""The identifier whose buffer nobody clears, so that each of its samples can be asked for."""
+"""The identifier whose buffer nobody clears, so that all of its samples can be checked."""
 
 _OTHERS = ("/fv_201", "/fv_202")
 IDENTIFIERS = (AUDITED, *(f"{valve}/identifier" for valve in _OTHERS))
@@ -46,15 +46,15 @@ NODES = (*IDENTIFIERS, f"{_VALVE}/simulator", f"{_VALVE}/pressure_source")
 STREAMS = (f"{_VALVE}/actuator_pressure", f"{_VALVE}/stem_state")
 
 SERVICES = {"identify": 6, "set_baseline": 6, "clear": 5, "save": 2, "report": 1}
-"""Services of an identifier, and how often each is called beside the others."""
+"""Services of an identifier, with the relative frequency of their calls."""
 
 
 def nodes(
     folder: Path, valve: str = _VALVE, others: Sequence[str] = _OTHERS
 ) -> dict[str, list[str]]:
-    """Return the commands of the nodes of a plant that writes into a folder.
+    """Return the commands that start the nodes of a plant, which writes into a folder.
 
-    The valve streams as its bench does; the others, in one process, hear the same streams.
+    The valve streams like its bench. The others share a process and hear the same streams.
     """
     files = parameters(
         history_file=folder / "history.sqlite",
@@ -79,32 +79,32 @@ def nodes(
 
 
 def process_of(service: str) -> str:
-    """Return the process of `nodes` that answers a service."""
+    """Return the name of the process in `nodes` that answers a service."""
     valve, name, _ = service.strip("/").split("/")
     return "identifiers" if f"/{valve}" in _OTHERS else name
 
 
 ANSWER_LIMIT = 5.0
-"""Time, s, within which a call is to be answered."""
+"""Time limit for the answer to a call, s."""
 _HANG = 30.0
-"""Time, s, after which a call will not be answered any more."""
+"""Time, s, after which a call is considered unanswered."""
 _DISCOVERY = 30.0
 _LONGEST_LISTENING = 2.0
 _MOST_ACTS = 6
 _RELIABLE = (ReliabilityPolicy.RELIABLE, ReliabilityPolicy.BEST_EFFORT)
 _LOOK = 25.0
-"""Time between two looks of the auditor into the buffer, s: less than half of what it holds."""
+"""Time between two checks of the buffer by the auditor, s: less than half of its length."""
 
 
 class Visitor(Participant):
-    """A participant that notes each of its calls."""
+    """A participant that logs each of its calls."""
 
     def __init__(self, ledger: Ledger, name: str) -> None:
         self._ledger = ledger
         super().__init__(name)
 
     def call(self, kind: type, name: str, request: Any) -> Any:
-        """Call a service, and note how it answered; return the answer, None without one."""
+        """Call a service and log the outcome; return the answer, or None."""
         client = self.node.create_client(kind, name)
         try:
             begin = time.monotonic()
@@ -195,7 +195,7 @@ _ACTS = {_trigger: 4, _parameters: 1, _listen: 2, _look_around: 1, _publish_else
 
 
 def visit(ledger: Ledger, number: int, chance: random.Random) -> None:
-    """Come, act some times, and go; one in four leaves without a word to the others."""
+    """Come, act several times, and leave; one in four leaves without saying goodbye."""
     visitor = Visitor(ledger, f"visitor_{number}")
     for _ in range(chance.randint(1, _MOST_ACTS)):
         (act,) = chance.choices([*_ACTS], [*_ACTS.values()])
@@ -216,14 +216,14 @@ def _stamps(bag: Path) -> dict[str, np.ndarray]:
 
 
 def missing_samples(stamps: np.ndarray) -> int:
-    """Return how many samples lack between the first and the last stamp (ns) of a signal."""
+    """Return the number of samples missing between the first and last stamp, ns, of a signal."""
     return 0 if stamps.size == 0 else round(np.ptp(stamps) * RATE / 1e9) + 1 - stamps.size
 
 
 def audit(ledger: Ledger, seconds: float) -> None:
-    """Save the buffer of the audited identifier again and again, and count what it lacks.
+    """Save the buffer of the audited identifier repeatedly, and count missing samples.
 
-    Note too for how long `/diagnostics` fell silent.
+    Also log the longest silence on `/diagnostics`.
     """
     published: list[float] = []
 
@@ -237,7 +237,7 @@ def audit(ledger: Ledger, seconds: float) -> None:
         visitor.node.create_subscription(DiagnosticArray, "/diagnostics", note, 1000)
         while time.monotonic() < until:
             visitor.spin(_LOOK)
-            published.append(time.time())  # a silence that lasts counts too
+            published.append(time.time())  # includes a silence that still lasts
             answer = visitor.call(Trigger, f"{AUDITED}/save", Trigger.Request())
             if answer is None or not answer.success:
                 ledger.add("unsaved", message=getattr(answer, "message", "no answer"))

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Exports of other programs, with known truth: what of them is read, and what is read rightly.
+"""Exports of other programs with known truth, to test whether they are read, and read correctly.
 
 `python -m benchmark.exports` draws the valves, writes the files, reads them and prints a table.
 """

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Draw, write and read the exports; print what became of each."""
+"""Draw, write and read the exports; print the outcome of each."""
 
 import argparse
 import tempfile
@@ -23,7 +23,7 @@ from benchmark.exports.truth import draw
 
 
 def main() -> None:
-    """Read the exports of a draw."""
+    """Draw the exports and read them."""
     parser = argparse.ArgumentParser(prog="python -m benchmark.exports")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--keep", type=Path, metavar="FOLDER", help="write the files there")

@@ -7,9 +7,9 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""What fifty programs write: each a function of the truth, and of chance, to the bytes of a file.
+"""Exports of fifty programs: each function turns the truth, with some chance, into a file.
 
-The conventions are those of the programs' own exports; numbers are rounded as they round them.
+Conventions and rounding follow the exports of the real programs.
 """
 
 import csv
@@ -35,23 +35,23 @@ TRANSMITTER = (0.0, 4e5)
 _ISO = "%Y-%m-%d %H:%M:%S.<f>"
 _PI_WORDS = ("Bad Input", "I/O Timeout", "No Data", "Bad", "Scan Off")
 _EXACT = {"coarse_pressure": 1e-6, "coarse_position": 1e-12}
-"""Rounding of a file that holds all digits."""
+"""Rounding errors of a file with all digits."""
 
 Texts = Sequence[str]
 
 
 @dataclass(frozen=True)
 class Export:
-    """A file, and what a person knows who has to answer.
+    """A file, and the knowledge of the person who reads it.
 
     Attributes
     ----------
     answers : mapping of str to str
         The true answer to each option, by its name in `Columns`.
     coarse_pressure, coarse_position, clock : float
-        Largest error by rounding, Pa, m and s.
+        Largest rounding error, Pa, m and s.
     exact_date : bool
-        Whether the file says when it was recorded.
+        Whether the file contains the date of the record.
     """
 
     name: str
@@ -69,7 +69,7 @@ def _times(truth: Truth, form: str = _ISO, zone: str = "UTC", digits: int = 3) -
     for stamp in truth.stamps.tolist():
         moment = datetime.fromtimestamp(stamp // 10**9, timezone.utc).astimezone(local)
         text = moment.strftime(form).replace("<f>", f"{stamp % 10**9:09d}"[:digits])
-        # hours and days without zeros before them, as Americans write them
+        # hours and days without leading zeros, as in the USA
         text = text.replace("<h>", str(moment.hour % 12 or 12))
         found.append(text.replace("<d>", str(moment.day)).replace("<m>", str(moment.month)))
     return found
@@ -82,7 +82,7 @@ def _rounded(values: NDArray[np.float64], digits: int, mark: str = ".") -> list[
 def _signals(
     truth: Truth, pressure_unit: str, position_unit: str, mark: str = "."
 ) -> tuple[list[str], list[str], dict[str, float]]:
-    """Return pressure and position in their units, and the errors by their rounding."""
+    """Return pressure and position in their units, with their rounding errors."""
     size = PRESSURES[pressure_unit]
     digits = {"Pa": 0, "kPa": 3, "bar": 5, "mbar": 2, "psi": 4}[pressure_unit]
     pressure = _rounded(truth.pressure / size, digits, mark)
@@ -95,7 +95,7 @@ def _signals(
 
 
 def _with_words(texts: list[str], random: Random) -> list[str]:
-    """Replace a drawn share, up to 3 %, by the words of a program for bad values."""
+    """Replace a random share of values, up to 3 %, by a program's words for bad values."""
     bad = random.random(len(texts)) < random.uniform(0, 0.03)
     bad[:3] = False
     return [
@@ -243,7 +243,7 @@ def pi_csv(truth: Truth, random: Random) -> Export:
 
 
 def pi_pairs(truth: Truth, random: Random) -> Export:
-    """Archived values: each tag with times of its own."""
+    """Archived values: each tag with its own times."""
     tag, times = _tag(random), _times(truth, "%d-%b-%Y %H:%M:%S.<f>")
     pressure, position, coarse = _signals(truth, "bar", "%")
     right = [
@@ -322,7 +322,7 @@ def ignition_dataset(truth: Truth, random: Random) -> Export:
 
 
 def _every(truth: Truth, seconds: float) -> Truth:
-    """Return what a slow recorder has of the samples."""
+    """Return the samples of a slow recorder."""
     step = round(seconds / truth.time[1])
     signals = {name: getattr(truth, name)[::step] for name in ("time", "pressure", "position")}
     return replace(truth, **signals)
@@ -406,7 +406,7 @@ def labview_clock(truth: Truth, random: Random) -> Export:
 
 
 def plotjuggler(truth: Truth, random: Random) -> Export:
-    """The two topics of a bag, each in rows of its own."""
+    """The two topics of a bag in separate rows."""
     valve, topic = _tag(random).lower().replace("-", "_"), "actuator_pressure/fluid_pressure"
     rows = [("__time", f"/{valve}/{topic}", f"/{valve}/stem_state/stem/position")]
     signals = (truth.stamps / 1e9, truth.pressure, truth.position)
@@ -563,7 +563,7 @@ def german_thousands(truth: Truth, random: Random) -> Export:
 
 
 def win_cc(truth: Truth, random: Random) -> Export:
-    """Times of whole seconds beside days·10⁶: many values of a second."""
+    """Times in whole seconds, so that many values share a second, beside days·10⁶."""
     clock = _rounded((truth.stamps / 86_400e9 + 25_569) * 1e6, 4, ",")
     times = _times(truth, "%d.%m.%Y %H:%M:%S")
     pressure, stem = (
@@ -578,10 +578,10 @@ def win_cc(truth: Truth, random: Random) -> Export:
 
 
 def bad_beyond(truth: Truth, random: Random) -> Export:
-    """A fifth of the values bad: refused, with the option that allows it."""
+    """A file with a fifth of its values bad: refused, naming the option that allows it."""
     pressure, position, coarse = _signals(truth, "bar", "%")
     bad = random.random(len(pressure)) < 0.2
-    bad[:1] = False  # the time is that since the first sample
+    bad[:1] = False  # times are relative to the first sample
     shown = ["#N/A" if one else text for one, text in zip(bad, pressure, strict=True)]
     rows = [("Time (s)", "Position (%)", "Pressure (bar)")]
     rows += _columns(_rounded(truth.time, 3), position, shown)
@@ -600,7 +600,7 @@ def opc_quality(truth: Truth, random: Random) -> Export:
 
 
 def kelvin_lab(truth: Truth, random: Random) -> Export:
-    """A column of another pressure, and no header of the stem that says so."""
+    """A column with another pressure, and a stem column whose header does not say so."""
     pressure, position, coarse = _signals(truth, "bar", "mm")
     times, supply = _rounded(truth.time, 3), _rounded(6 + 0 * truth.time, 3)
     rows = [("t [s]", "supply pressure [bar]", "chamber [bar]", "LVDT [mm]")]
@@ -609,7 +609,7 @@ def kelvin_lab(truth: Truth, random: Random) -> Export:
 
 
 def ignition_table(truth: Truth, random: Random) -> Export:
-    """Dates as Java writes them in America."""
+    """Dates in the US format of Java."""
     truth = _every(truth, 1.0)
     pressure, position, coarse = _signals(truth, "psi", "%")
     times = _times(truth, f"%b <d>, %Y{_one_of(random, ',', '')} <h>:%M:%S %p")
@@ -618,7 +618,7 @@ def ignition_table(truth: Truth, random: Random) -> Export:
 
 
 def yokogawa(truth: Truth, random: Random) -> Export:
-    """Day, time and milliseconds in columns of their own."""
+    """Day, time and milliseconds in separate columns."""
     pressure, position, coarse = _signals(truth, "kPa", "%")
     rows = [("GX20",), ("Date", "Time", "sub sec", "PT101", "ZT101"), ("", "", "", "kPa(g)", "%")]
     times = (_times(truth, form) for form in ("%Y/%m/%d", "%H:%M:%S", "<f>"))
@@ -655,7 +655,7 @@ def second_sheet(truth: Truth, random: Random) -> Export:
 
 
 def quoted_commas(truth: Truth, random: Random) -> Export:
-    """Decimal commas between quotes, and commas between them."""
+    """Decimal commas inside quotes, and commas as separators."""
     pressure, position, coarse = _signals(truth, "bar", "mm", ",")
     rows = [("Zeit (s)", "Hub (mm)", "Druck (bar)")]
     rows += _columns(_rounded(truth.time, 3, ","), position, pressure)
@@ -664,7 +664,7 @@ def quoted_commas(truth: Truth, random: Random) -> Export:
 
 
 def sentinels(truth: Truth, random: Random) -> Export:
-    """A number stands for none, and the zone beside the time."""
+    """A number marks missing values, and the header gives the time zone."""
     pressure, position, coarse = _signals(truth, "bar", "%")
     shown = ["-9999" if random.random() < 0.01 else text for text in position]
     rows = [("Time (UTC+2)", "ZT-101 [%]", "PT-101 [bar]")]
@@ -673,7 +673,7 @@ def sentinels(truth: Truth, random: Random) -> Export:
 
 
 def excel_minutes(truth: Truth, random: Random) -> Export:
-    """What Excel shows, and saves, of times with fractions: 32:15.0."""
+    """Times with fractions as Excel shows and saves them: 32:15.0."""
     truth = _every(truth, 0.1)
     pressure, position, coarse = _signals(truth, "bar", "%")
     rows = [("Time", "Position (%)", "Pressure (bar)")]
@@ -690,11 +690,11 @@ def finnish(truth: Truth, random: Random) -> Export:
 
 
 _FILE_TIME = 116_444_736_000_000_000
-"""1970 in 100 ns since 1601."""
+"""Start of 1970, in 100 ns since 1601."""
 
 
 def _scope(truth: Truth, mark: str) -> Export:
-    """Two columns a channel, whose time is in ms since the beginning; the stem at half the rate."""
+    """Two columns per channel, with time in ms since the start; the stem has half the rate."""
     pressure, position, coarse = _signals(truth, "bar", "mm", ",")
     since = (truth.stamps - truth.stamps[0]) / 1e6
     begin = truth.stamps[0] // 100 + _FILE_TIME

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Reads an export as a person would: without an option, then with those that the message names."""
+"""Read an export as a person would: without options, then with those named in the message."""
 
 import re
 from dataclasses import replace
@@ -27,7 +27,7 @@ _OPTION = re.compile(r"--([a-z][a-z-]+)")
 
 
 class Outcome(NamedTuple):
-    """What became of an export: ``none``, ``options``, ``refused`` or ``wrong``; the message."""
+    """Outcome of an export: ``none``, ``options``, ``refused`` or ``wrong``; and the message."""
 
     kind: str
     options: int
@@ -35,7 +35,7 @@ class Outcome(NamedTuple):
 
 
 def read(export: Export, truth: Truth, folder: Path) -> Outcome:
-    """Read an export; compare what was read with the truth."""
+    """Read an export, and compare the recording with the truth."""
     path = folder / export.name
     path.write_bytes(export.content)
     low, high = TRANSMITTER
@@ -65,7 +65,7 @@ def read(export: Export, truth: Truth, folder: Path) -> Outcome:
 
 
 def _fault(export: Export, truth: Truth, recording: Recording) -> str:
-    """Return how a recording differs from the truth; nothing if it does not."""
+    """Return how a recording differs from the truth; empty if it does not."""
     if recording.stamped is None:
         drive = (recording.time, recording.drive)
         stem = (recording.time, recording.position)

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Drawn valves and their motions, by a simulation that shares nothing with the package."""
+"""Randomly generated valves and motions, from a simulation that shares no code with the package."""
 
 from dataclasses import dataclass
 
@@ -21,7 +21,7 @@ DURATION = 40.0
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """A valve and what it did.
+    """A valve and its motion.
 
     Attributes
     ----------
@@ -50,9 +50,9 @@ class Truth:
 
 
 def draw(count: int, seed: int) -> list[Truth]:
-    """Draw valves, move them all at once by levels and ramps, and sample each at its own rate.
+    """Draw valves, move each by random ramps, and sample each at its own rate.
 
-    The stem is a mass without inertia behind Coulomb and viscous friction and a spring.
+    The massless stem has Coulomb friction, viscous friction and a spring.
     """
     random = np.random.default_rng(seed)
     area = random.uniform(0.01, 0.12, count)
@@ -78,7 +78,7 @@ def draw(count: int, seed: int) -> list[Truth]:
     found = []
     for one in range(count):
         every = int(random.choice([5, 10, 20, 50]))
-        # 2026-07-13 or later: whole milliseconds of a day beyond the 12th, or of any day
+        # 2026-01-01 or up to 299 days later, with whole seconds
         day = int(random.integers(0, 300))
         start = 1_767_225_600_000_000_000 + day * 86_400_000_000_000
         start += int(random.integers(6 * 3600, 20 * 3600)) * 1_000_000_000

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""A PostgreSQL server of a run's own, which the run may kill, stop and start again."""
+"""A private PostgreSQL server, which a run may kill, stop and restart."""
 
 import contextlib
 import itertools
@@ -34,7 +34,7 @@ def _program(name: str) -> str | None:
 
 
 def _somebody() -> dict[str, Any] | None:
-    """Return the user that the server runs as, as root may not; None if there is none."""
+    """Return the user for the server, which root may not run; None if there is none."""
     if os.geteuid():
         return {}
     for name in ("postgres", "nobody"):
@@ -58,10 +58,10 @@ def why_no_server() -> str | None:
 
 
 class PostgresServer:
-    """A server, with the superuser `owner`; other roles need a password.
+    """A server with the superuser `owner`; other roles need a password.
 
-    It listens at an address, to which others of its network of 256 addresses may come too; its log
-    is in its folder. RuntimeError is raised where no server can be started, see `why_no_server`.
+    It listens on one address and accepts connections from that /24 network. Its folder contains its
+    log. Raises RuntimeError if no server can be started; see `why_no_server`.
     """
 
     def __init__(self, address: str = "127.0.0.1") -> None:
@@ -104,12 +104,12 @@ class PostgresServer:
             raise RuntimeError(f"initdb: {done.stderr}")
 
     def launch(self) -> bool:
-        """Start it if it does not run; return whether it answers."""
+        """Start the server if it does not run; return whether it answers."""
         import psycopg  # noqa: PLC0415
 
         options = [f"--{name}={value}" for name, value in self.settings.items()]
         if self._process is None or self._process.poll() is not None:
-            # One that was killed leaves processes that end a little later.
+            # A killed server leaves processes that end a little later.
             with (self.folder / "log").open("ab") as log:
                 self._process = subprocess.Popen(
                     [str(_program("postgres")), "-D", str(self.data), *options],
@@ -126,7 +126,7 @@ class PostgresServer:
         return True
 
     def start(self) -> None:
-        """Start it, and wait until it answers."""
+        """Start the server, and wait until it answers."""
         deadline = time.monotonic() + _PATIENCE
         while not self.launch():
             if time.monotonic() > deadline:
@@ -149,7 +149,7 @@ class PostgresServer:
         return name
 
     def do(self, database: str, statement: str, values: Sequence[object] = ()) -> list[Any]:
-        """Do a statement as its owner; return the rows that it finds."""
+        """Execute a statement as owner; return its rows."""
         import psycopg  # noqa: PLC0415
 
         with psycopg.connect(self.url(database), autocommit=True) as connection:
@@ -157,7 +157,7 @@ class PostgresServer:
             return cursor.fetchall() if cursor.description else []
 
     def _signal(self, number: signal.Signals) -> None:
-        """Send a signal to the server and all that it has started."""
+        """Send a signal to the server and all its child processes."""
         if self._process is None:
             return
         found = [self._process.pid]
@@ -176,18 +176,18 @@ class PostgresServer:
             self._process.wait()
 
     def kill(self) -> None:
-        """Kill it and all that it has started, as a power cut does."""
+        """Kill the server and its child processes, like a power cut."""
         self._signal(signal.SIGKILL)
         if self._process is not None:
             self._process.wait()
 
     def stop(self) -> None:
-        """Stop it orderly; connections end."""
+        """Shut the server down cleanly; connections end."""
         self._end(signal.SIGINT)
 
     @contextlib.contextmanager
     def paused(self) -> Iterator[None]:
-        """Have it stand still."""
+        """Suspend the server."""
         self._signal(signal.SIGSTOP)
         try:
             yield
@@ -195,7 +195,7 @@ class PostgresServer:
             self._signal(signal.SIGCONT)
 
     def remove(self) -> None:
-        """End it, and delete what it has kept."""
+        """End the server, and delete its data."""
         self._signal(signal.SIGCONT)
         self._end(signal.SIGQUIT)
         shutil.rmtree(self.folder, ignore_errors=True)
@@ -203,7 +203,7 @@ class PostgresServer:
 
 @contextlib.contextmanager
 def running_server(address: str = "127.0.0.1") -> Iterator[PostgresServer | None]:
-    """Provide a new server at an address; None where no server can be started."""
+    """Provide a new server at an address, or None if no server can be started."""
     if why_no_server() is not None:
         yield None
         return

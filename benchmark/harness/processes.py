@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Processes: how they are started and ended, what they use and say, and where they hang."""
+"""Start, end and observe processes: resource use, output, and stacks when they hang."""
 
 import contextlib
 import os
@@ -22,17 +22,17 @@ from pathlib import Path
 from typing import IO, NamedTuple
 
 CODES = (0, -signal.SIGINT, -signal.SIGTERM)
-"""Exit codes of a node that was told to end; those of the signals before Python minds them."""
+"""Exit codes of a node after a signal; a signal before Python handles it gives its own code."""
 PATIENCE = 20.0
-"""Time, s, after which a process that was told to end is hung."""
+"""Time, s, after a signal until a process is considered hung."""
 _STACKS_PATIENCE = 60.0
 _START_PATIENCE = 90.0
-"""Time for a process to say what is waited for, s."""
+"""Time for a process to reach the expected state, s."""
 _TICKS, _PAGE = os.sysconf("SC_CLK_TCK"), os.sysconf("SC_PAGE_SIZE")
 
 
 def module(name: str, *arguments: str) -> list[str]:
-    """Return the command that runs a module of Python."""
+    """Return the command that runs a Python module."""
     return [sys.executable, "-m", name, *arguments]
 
 
@@ -42,12 +42,12 @@ def node(executable: str, *arguments: str) -> list[str]:
 
 
 def parameters(**values: object) -> list[str]:
-    """Return the arguments that set parameters of a node."""
+    """Return the arguments that set node parameters."""
     return [word for name, value in values.items() for word in ("-p", f"{name}:={value}")]
 
 
 def free_port(address: str = "127.0.0.1") -> int:
-    """Return a port of this machine that nobody listens at."""
+    """Return a free port on this machine."""
     with socket.socket() as tried:
         tried.bind((address, 0))
         port: int = tried.getsockname()[1]
@@ -55,20 +55,20 @@ def free_port(address: str = "127.0.0.1") -> int:
 
 
 def processor_seconds(process: int) -> float:
-    """Return the processor time that all threads of a process have used, s."""
+    """Return the processor time used by all threads of a process, s."""
     text = Path(f"/proc/{process}/stat").read_text(encoding="ascii")
     fields = text.rpartition(")")[2].split()
     return (int(fields[11]) + int(fields[12])) / _TICKS
 
 
 def resident_megabytes(process: int) -> float:
-    """Return the memory that a process has in use, MB."""
+    """Return the resident memory of a process, MB."""
     text = Path(f"/proc/{process}/statm").read_text(encoding="ascii")
     return int(text.split()[1]) * _PAGE / 1e6
 
 
 class Usage(NamedTuple):
-    """What a process has used until a time (s): processor time (s); and what it holds."""
+    """Resource use of a process at a time, s: processor time, s, memory, MB, threads and files."""
 
     time: float
     processor: float
@@ -77,22 +77,22 @@ class Usage(NamedTuple):
     files: int
 
     def cores_since(self, earlier: "Usage") -> float:
-        """Return the cores used since then."""
+        """Return the mean number of cores used since then."""
         return (self.processor - earlier.processor) / (self.time - earlier.time)
 
 
 class Process(contextlib.AbstractContextManager["Process"]):
-    """A program that runs, and is ended where the `with` of it ends.
+    """A running program, which ends with its `with` block.
 
     Parameters
     ----------
     command : sequence of str
         The program and its arguments.
     log : Path or None
-        File to which its output is added, with the stacks of all its threads if it hangs; None: the
-        output is read here, and its input is open until it is ended.
+        File for the output, and for the stacks of all threads if the program hangs. None: read the
+        output here, and keep the input open until the end.
     environment : mapping of str to str or None
-        Its environment; None: that of this process.
+        Environment variables; None for those of this process.
     """
 
     def __init__(
@@ -123,16 +123,16 @@ class Process(contextlib.AbstractContextManager["Process"]):
 
     @property
     def output(self) -> IO[str]:
-        """What it says, of a process without a log."""
+        """Output stream of a process without a log."""
         assert self._process.stdout is not None  # noqa: S101 - it was asked for
         return self._process.stdout
 
     def said(self) -> str:
-        """Return what it has written into its log."""
+        """Return the content of the log."""
         return self._log.read_text("utf-8", "replace") if self._log else ""
 
     def exit_code(self) -> int | None:
-        """Return the exit code; None while it runs."""
+        """Return the exit code; None while the process runs."""
         return self._process.poll()
 
     def require_running(self) -> None:
@@ -141,11 +141,11 @@ class Process(contextlib.AbstractContextManager["Process"]):
             raise RuntimeError(f"{self.command} ended with {code}; it said {self.said()}")
 
     def wait_for(self, words: str) -> float:
-        """Wait until it has said these words; return the time since its start, s."""
+        """Wait until these words are in the log; return the time since the start, s."""
         return self.wait_until(lambda: words in self.said(), words)
 
     def wait_until(self, is_met: Callable[[], bool], what: str) -> float:
-        """Wait until something is so, while it runs; return the time since its start, s."""
+        """Wait for a condition while the process runs; return the time since the start, s."""
         while not is_met():
             self.require_running()
             if time.monotonic() > self.begin + _START_PATIENCE:
@@ -154,18 +154,18 @@ class Process(contextlib.AbstractContextManager["Process"]):
         return time.monotonic() - self.begin
 
     def send(self, request: signal.Signals) -> None:
-        """Send a signal, and wait for nothing."""
+        """Send a signal without waiting."""
         self._process.send_signal(request)
 
     def kill(self) -> None:
-        """Kill it, and see it gone."""
+        """Kill the process, and wait until it is gone."""
         self._process.kill()
         self._process.communicate()
 
     def end(self, request: signal.Signals = signal.SIGTERM) -> float | None:
-        """Send a signal; return the time to the end of the process, s.
+        """Send a signal; return the time until the process ends, s.
 
-        A process that hangs leaves its stacks and is killed; None is returned.
+        If the process hangs, write its stacks, kill it and return None.
         """
         begin = time.monotonic()
         self._process.send_signal(request)
@@ -177,7 +177,7 @@ class Process(contextlib.AbstractContextManager["Process"]):
         return time.monotonic() - begin
 
     def write_stacks(self) -> None:
-        """Write the stacks of all threads, of C where gdb is there and of Python; kill it."""
+        """Write the Python stacks of all threads, and C stacks if gdb exists; then kill."""
         debugger = ("gdb", "-p", str(self.pid), "-batch", "-ex", "thread apply all bt")
         with self._output() as stream, contextlib.suppress(subprocess.TimeoutExpired):
             if shutil.which(debugger[0]):
@@ -190,14 +190,14 @@ class Process(contextlib.AbstractContextManager["Process"]):
         self.kill()
 
     def usage(self) -> Usage:
-        """Return what it has used so far, and what it holds."""
+        """Return the resource use so far."""
         process = Path(f"/proc/{self.pid}")
         threads, files = (len(list((process / name).iterdir())) for name in ("task", "fd"))
         processor, memory = processor_seconds(self.pid), resident_megabytes(self.pid)
         return Usage(time.monotonic(), processor, memory, threads, files)
 
     def proportional(self) -> float:
-        """Return its memory, MB, what it shares with other processes divided among them."""
+        """Return the proportional set size, MB: shared memory is divided among its processes."""
         text = Path(f"/proc/{self.pid}/smaps_rollup").read_text(encoding="ascii")
         (line,) = (one for one in text.splitlines() if one.startswith("Pss:"))
         return int(line.split()[1]) * 1024 / 1e6
@@ -205,7 +205,7 @@ class Process(contextlib.AbstractContextManager["Process"]):
 
 @contextlib.contextmanager
 def running(processes: list[Process]) -> Iterator[list[Process]]:
-    """Provide a list of processes that are ended at the end, the newest first."""
+    """Provide a list of processes, and end them on exit, the newest first."""
     try:
         yield processes
     finally:

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Measured items, each beside its peer and its goal: as rows, as a table and as JSON."""
+"""Measured items with their peers and goals, as rows, tables and JSON."""
 
 import datetime
 import json
@@ -32,19 +32,19 @@ class Row:
     Attributes
     ----------
     item : str
-        What was measured.
+        Measured quantity.
     ours : float
-        What the package needs or reaches.
+        Value for the package.
     unit : str
         Unit of `ours` and `peer`.
     peer : float or None
-        The same of the peer, where there is one.
+        Value for the peer, if there is one.
     peer_name : str
-        What the peer is.
+        Name of the peer.
     goal : str
-        What was to be reached, in words; empty: the item is told for comparison.
+        Goal in words; empty if the item is for comparison only.
     met : bool or None
-        Whether it was; None where there is no goal.
+        Whether the goal was met; None without a goal.
     """
 
     item: str
@@ -57,13 +57,13 @@ class Row:
 
     @property
     def ratio(self) -> float | None:
-        """Peer over ours: for a cost, how many times cheaper ours is."""
+        """Peer over ours: for a cost, the factor by which ours is cheaper."""
         return None if self.peer is None or self.ours == 0 else self.peer / self.ours
 
 
 @dataclass(frozen=True)
 class Bound:
-    """One requirement, what was reached, and whether that is enough."""
+    """A requirement, the figure reached, and whether it is met."""
 
     what: str  # the requirement
     reached: str  # the figure reached
@@ -71,29 +71,29 @@ class Bound:
 
 
 def none(item: str, count: int) -> Row:
-    """Return a count that shall be zero."""
+    """Return a count that must be zero."""
     return Row(item, count, goal="none", met=count == 0)
 
 
 def some(item: str, count: int) -> Row:
-    """Return a count that shall not be zero."""
+    """Return a count that must not be zero."""
     return Row(item, count, goal="some", met=count > 0)
 
 
 def at_most(item: str, value: float, unit: str, limit: float, *peer: float | str) -> Row:
-    """Return a value, beside its peer, that shall not be above a limit."""
+    """Return a value, with its peer, that must not exceed a limit."""
     told = peer or (None, "")
     return Row(item, value, unit, *told, f"at most {limit:g} {unit}", value <= limit)
 
 
 def under(item: str, value: float, unit: str, limit: float, *peer: float | str) -> Row:
-    """Return a value, beside its peer, that shall be below a limit."""
+    """Return a value, with its peer, that must be below a limit."""
     told = peer or (None, "")
     return Row(item, value, unit, *told, f"under {limit:g} {unit}".rstrip(), value < limit)
 
 
 def machine_shape() -> dict[str, str | float]:
-    """Tell what of the machine, its load and its software the numbers depend on."""
+    """Return the properties of machine, load and software that affect the numbers."""
     return {
         "cores": os.cpu_count() or 1,
         "load": round(os.getloadavg()[0], 1),
@@ -104,21 +104,21 @@ def machine_shape() -> dict[str, str | float]:
 
 
 def opened_console() -> Console:
-    """Return a console on which the machine has been told."""
+    """Return a console after printing the properties of the machine."""
     console = Console(width=None if sys.stdout.isatty() else _WIDTH_OF_A_FILE)
     console.print(", ".join(f"{name} {value}" for name, value in machine_shape().items()))
     return console
 
 
 def logged(rows: Iterable[Row], found: list[Row], console: Console) -> None:
-    """Add rows to what was found, and print each as it comes."""
+    """Append rows to `found`, and print each as it arrives."""
     for row in rows:
         found.append(row)
         console.log(f"{row.item}: {row.ours:.3g} {row.unit}")
 
 
 def judged(rows: Iterable[Row], console: Console) -> int:
-    """Print which goals are missed; return 1 if any is, else 0."""
+    """Print the missed goals; return 1 if there are any, else 0."""
     goals = [row for row in rows if row.met is not None]
     missed = [row for row in goals if not row.met]
     for row in missed:
@@ -147,7 +147,7 @@ def rows_table(title: str, rows: Sequence[Row]) -> Table:
 
 
 def write_json(parts: Mapping[str, Sequence[Row]], path: Path) -> None:
-    """Write date, shape of the machine and all rows."""
+    """Write date, properties of the machine and all rows."""
     content = {
         "date": datetime.datetime.now(datetime.timezone.utc).date().isoformat(),
         "machine": machine_shape(),

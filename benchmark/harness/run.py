@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""A run of some length in a domain of its own: options, ledger, account, and a participant."""
+"""A timed run in a private domain: options, ledger, evaluation, and a participant."""
 
 import argparse
 import contextlib
@@ -31,10 +31,10 @@ Events = Sequence[Mapping[str, Any]]
 
 
 class Ledger:
-    """What happened, as lines of JSON: a file of events, each a kind and what is known of it.
+    """A file of events as lines of JSON, each with a kind and further keys.
 
-    Many processes may append to it. A line is written at once, so that a process may be killed at
-    any time.
+    Many processes may append to it. Each line is written in one call, so that a process may be
+    killed at any time.
     """
 
     def __init__(self, path: Path) -> None:
@@ -54,7 +54,7 @@ class Ledger:
 
 
 def by_kind(events: Events) -> Mapping[str, Events]:
-    """Sort events by their kind; none of a kind that did not happen."""
+    """Group events by kind; a kind that did not occur gives an empty list."""
     found = defaultdict[str, list[Mapping[str, Any]]](list)
     for one in events:
         found[one["kind"]].append(one)
@@ -63,7 +63,7 @@ def by_kind(events: Events) -> Mapping[str, Events]:
 
 @contextlib.contextmanager
 def quiet_domain() -> Iterator[int]:
-    """Provide a domain of this machine that nobody else uses."""
+    """Provide a domain that nobody else on this machine uses."""
     with free_domain() as domain:
         os.environ |= {
             "ROS_DOMAIN_ID": str(domain),
@@ -74,14 +74,14 @@ def quiet_domain() -> Iterator[int]:
 
 
 def own_folder(name: str, wanted: Path | None) -> Path:
-    """Return the folder that was wanted, or a new one."""
+    """Return the requested folder, or a new folder."""
     folder = wanted or Path(tempfile.mkdtemp(prefix=f"{name}_"))
     folder.mkdir(parents=True, exist_ok=True)
     return folder
 
 
 def run_parser(name: str, text: str | None) -> argparse.ArgumentParser:
-    """Return a parser that asks how long, by which chance and where."""
+    """Return a parser with the options for length, seed and folder."""
     parser = argparse.ArgumentParser(prog=name, description=text)
     parser.add_argument("--minutes", type=float, default=60.0, help="how long (%(default)g)")
     parser.add_argument("--seed", type=int, help="of all chance; default: drawn, and printed")
@@ -95,9 +95,9 @@ def endured(
     arguments: Sequence[str] | None,
     live: Callable[[argparse.Namespace, float, Ledger], Iterable[Row]],
 ) -> int:
-    """Let `live` run, and print the rows that it returns; return 1 if a goal is missed.
+    """Run `live` and print its rows; return 1 if a goal is missed.
 
-    It is given the options, with a seed and a folder, the length (s) and the ledger.
+    `live` receives the options with a seed and a folder, the length, s, and the ledger.
     """
     options = parser.parse_args(arguments)
     if options.seed is None:
@@ -114,16 +114,16 @@ def endured(
 
 
 class Participant(contextlib.AbstractContextManager["Participant"]):
-    """A node that hears others while it is spun; it leaves where the `with` of it ends.
+    """A node that hears others while it spins, and leaves at the end of its `with` block.
 
     Parameters
     ----------
     name : str
         Name of the node.
     domain : int or None
-        Its domain; None: that of the environment.
+        ROS domain; None for that of the environment.
     options
-        Further ones of a node.
+        Further options of a node.
     """
 
     def __init__(self, name: str, domain: int | None = None, **options: Any) -> None:
@@ -137,7 +137,7 @@ class Participant(contextlib.AbstractContextManager["Participant"]):
         self.close()
 
     def close(self) -> None:
-        """Leave politely."""
+        """Leave cleanly."""
         self._executor.shutdown()
         self.node.destroy_node()
         self.context.try_shutdown()
@@ -149,7 +149,7 @@ class Participant(contextlib.AbstractContextManager["Participant"]):
             self._executor.spin_once(timeout_sec=left)
 
     def wait(self, is_met: Callable[[], bool], limit: float) -> bool:
-        """Listen until something is so; return whether it came so within a limit, s."""
+        """Listen until a condition is met; return whether it was met within a limit, s."""
         end = time.monotonic() + limit
         while not is_met():
             if time.monotonic() > end:
@@ -158,6 +158,6 @@ class Participant(contextlib.AbstractContextManager["Participant"]):
         return True
 
     def answer(self, call: Any, limit: float) -> Any:
-        """Listen until a call is answered; return its answer, None if none came in time."""
+        """Listen until a call is answered; return the answer, or None after the limit."""
         self._executor.spin_until_future_complete(call, limit)
         return call.result() if call.done() else None
