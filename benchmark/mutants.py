@@ -9,13 +9,13 @@
 
 """What the tests would not notice: python -m benchmark.mutants, or `make mutants`.
 
-mutmut changes an operator, a number, an argument or a word of a function at a time, and the tests
-of the room that it belongs to are run against the change: a mutant that no test fails with has
-survived. Each room is worked on in a copy, `build/mutants/<room>`, with its own tests only.
+mutmut changes one operator, number, argument or word of a function at a time, and runs the tests of
+its room against the change. A mutant survives if no test fails. Each room is mutated in a copy,
+`build/mutants/<room>`, with its own tests only.
 
-mutmut leaves decorated functions alone. Properties are unwrapped in the copy, so they are mutated
-too. Compiled kernels are not: their tests take minutes without the compiler. Neither are the
-numbers of a module outside its functions, for which the tests derive their own.
+mutmut skips decorated functions. The copy unwraps properties, so they are mutated too. Compiled
+kernels are not mutated: their tests take minutes without the compiler. Numbers of a module outside
+its functions are not mutated either, since the tests derive their own.
 """
 
 import argparse
@@ -40,10 +40,10 @@ PROJECT = Path(__file__).resolve().parents[1]
 WORKSPACE = PROJECT / "build" / "mutants"
 COPIED = ("valve_friction_ros", "test", "benchmark", "config")
 
-# A mutant may take this many times as long as the tests that reach it, and so many seconds more.
+# Time limit of a mutant: a multiple of the time of the tests that reach it, plus some seconds.
 TIME_FACTOR, TIME_MORE = 4.0, 5.0
 
-# The same example is run in one process, then in another, and none is made smaller.
+# The same example runs in several processes, and examples are not shrunk.
 CONFTEST = """
 from hypothesis import HealthCheck, Phase
 settings.register_profile(
@@ -58,11 +58,11 @@ settings.load_profile("mutants")
 
 PROPERTY = re.compile(r"^    @(property|cached_property)\n    def (\w+)\(", re.MULTILINE)
 KILLED = {1, 3, -24, 24, 152, 36, 255, -9, -11}
-"""Exit codes: tests failed, mutant timed out, or crashed."""
+"""Exit codes: tests failed, or the mutant timed out or crashed."""
 
 
 class Room(NamedTuple):
-    """Folder of the code, and the files or folders of its tests."""
+    """Folder of the code, and files or folders of its tests."""
 
     code: str
     tests: tuple[str, ...]
@@ -79,13 +79,13 @@ ROOMS = {
 
 
 def say(text: str) -> None:
-    """Write a line, at once."""
+    """Print a line immediately."""
     sys.stdout.write(f"{text}\n")
     sys.stdout.flush()
 
 
 def unwrapped(source: str) -> str:
-    """Write each property of a module as a method, and the property made from it."""
+    """Rewrite each property of a module as a method and a property made from it."""
     pieces, end = [], 0
     for match in PROPERTY.finditer(source):
         kind, name = match.groups()
@@ -100,7 +100,7 @@ def unwrapped(source: str) -> str:
 
 
 def prepare(name: str, slow: bool) -> Path:
-    """Copy the project for a room, with mutmut's settings for it; what is kept is its cache."""
+    """Copy the project for a room, with the room's settings of mutmut."""
     room, place = ROOMS[name], WORKSPACE / name
     shutil.rmtree(place, ignore_errors=True)
     for part in COPIED:
@@ -119,7 +119,7 @@ def prepare(name: str, slow: bool) -> Path:
         "timeout_constant": TIME_MORE,
         "use_git_change_detection": False,
     }
-    # JSON's strings, numbers and lists are TOML's, and so are its truths.
+    # Strings, numbers, lists and booleans are the same in JSON and TOML.
     lines = [f"{key} = {json.dumps(value)}" for key, value in settings.items()]
     shown = (PROJECT / "pyproject.toml").read_text()
     (place / "pyproject.toml").write_text("\n".join([shown, "[tool.mutmut]", *lines, ""]))
@@ -127,7 +127,7 @@ def prepare(name: str, slow: bool) -> Path:
 
 
 def mutant_names(room: Room) -> list[str]:
-    """Name all mutants of a room; the working directory is its copy."""
+    """Return the names of all mutants of a room; the working directory is its copy."""
     names = []
     for path in sorted(Path(room.code).glob("*.py")):
         found = mutate_file_contents(str(path), path.read_text(), None, None).mutant_names
@@ -136,7 +136,7 @@ def mutant_names(room: Room) -> list[str]:
 
 
 def outcomes(room: Room, chosen: set[str]) -> Iterator[tuple[Path, Mapping[str, int]]]:
-    """Yield the exit code of each chosen mutant, a file at a time."""
+    """Yield the exit codes of the chosen mutants, file by file."""
     for path in sorted(Path(room.code).glob("*.py")):
         meta = Path("mutants") / f"{path}.meta"
         codes = json.loads(meta.read_text())["exit_code_by_key"] if meta.exists() else {}
@@ -144,12 +144,12 @@ def outcomes(room: Room, chosen: set[str]) -> Iterator[tuple[Path, Mapping[str, 
 
 
 def survivors_of(name: str) -> Path:
-    """File that keeps what survived in a room when it was last run."""
+    """Return the file with the survivors of the last run of a room."""
     return WORKSPACE / f"{name}-survivors.txt"
 
 
 def report(name: str, chosen: set[str]) -> Counter[str]:
-    """Print how many mutants of each file were killed, and what the others change."""
+    """Print the number of killed mutants per file, and the changes of the survivors."""
     total: Counter[str] = Counter()
     survivors: list[tuple[str, Path]] = []
     say(f"\n{'killed':>8} {'of':>5}   file")
@@ -171,7 +171,7 @@ def report(name: str, chosen: set[str]) -> Counter[str]:
 
 
 def run(name: str, arguments: argparse.Namespace) -> Counter[str]:
-    """Try the mutants of a room, or a sample of them."""
+    """Test all mutants of a room, or a sample."""
     os.chdir(prepare(name, arguments.slow))
     reset_config()
     names = [one for one in mutant_names(ROOMS[name]) if arguments.only in one]
@@ -193,7 +193,7 @@ def run(name: str, arguments: argparse.Namespace) -> Counter[str]:
 
 
 def main() -> None:
-    """Run the rooms that are asked for."""
+    """Run the requested rooms."""
     parser = argparse.ArgumentParser(prog="make mutants", description=__doc__.splitlines()[0])
     parser.add_argument("--room", choices=ROOMS, action="append", help="default: all")
     parser.add_argument("--only", default="", help="mutants whose names contain this, as a file's")

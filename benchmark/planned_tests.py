@@ -38,7 +38,7 @@ _BOTTOM, _SPAN = 0.0, 1e6
 _CONDITIONS = Conditions(_RATE)
 _LIMITS = Limits(0.2, 0.8)
 _WRONG = (1.0, 0.5, 2.0)
-"""Friction assumed over the true one."""
+"""Assumed friction over the true friction."""
 
 _COMPARED = (("reported", "predicted"), ("errors", "predicted"), ("square", "reported"))
 
@@ -52,21 +52,21 @@ _LAWS: Mapping[str, Mapping[str, object]] = {
 
 @dataclass(frozen=True)
 class Trial:
-    """One valve, planned for and identified.
+    """One valve with its planned test and its identification.
 
     Attributes
     ----------
     law : str
-        Its physics.
+        Name of its friction law.
     wrong : float
-        Friction that was assumed, over the true one.
+        Assumed friction over the true friction.
     predicted, reported, square, errors : mapping of str to float
-        Half widths predicted, reported, and reported of the square wave, and real errors, shares of
-        the true values; by the name of the number.
+        Half widths predicted, reported, and reported for the square wave, and actual errors, as
+        shares of the true values, by the name of the number.
     refusal : str
-        Why there is no plan or no result; empty if there are both.
+        Why there is no plan or no result; empty otherwise.
     reach : tuple of float
-        Positions that were reached, shares of the travel.
+        Lowest and highest position, shares of the travel.
     """
 
     law: str
@@ -90,7 +90,7 @@ def _plant(law: str, random: np.random.Generator) -> Plant:
 def _record(
     plant: Plant, excitation: Excitation, duration: float, seed: int
 ) -> tuple[Record, tuple[float, float]]:
-    """Let a valve play a signal, and measure it."""
+    """Drive a valve with a signal, and measure it."""
     lag = _CONDITIONS.converter_lag
     loop = Loop(False, False, 0.0, 1.0, 1000, 1.0, _BOTTOM, _SPAN, lag)
     time = np.arange(round(duration / GRID) + 1) * GRID
@@ -108,7 +108,7 @@ def _record(
 
 
 def _told(record: Record) -> tuple[dict[str, float], dict[str, float], str]:
-    """Identify; return half widths and errors over the true values, and a refusal."""
+    """Identify a record; return half widths and errors over the true values, and a refusal."""
     answer = identify(record)
     if answer.refusal:
         return {}, {}, answer.refusal
@@ -122,7 +122,7 @@ def _told(record: Record) -> tuple[dict[str, float], dict[str, float], str]:
 
 
 def _plan(plant: Plant, wrong: float) -> tuple[StrokePlan, int]:
-    """Plan for a friction that is wrong; return the place of the true one among the forecasts."""
+    """Plan for a wrong friction; return the plan, and the index of the true friction's forecast."""
     body, friction = plant.body, plant.friction
     valve = Valve(body.area, body.pressure_reference, body.travel, -20e3, 270e3)
     frictions = known_friction(
@@ -138,7 +138,7 @@ def _plan(plant: Plant, wrong: float) -> tuple[StrokePlan, int]:
 
 
 def trials(count: int, first_seed: int = _HELD_BACK) -> Iterator[Trial]:
-    """Plan for `count` random valves, and try the plans."""
+    """Plan tests for `count` random valves, and run them."""
     for seed in range(first_seed, first_seed + count):
         random = np.random.default_rng(seed)
         law = list(_LAWS)[seed % len(_LAWS)]
@@ -166,7 +166,7 @@ def _quantiles(values: Sequence[float]) -> str:
 
 
 def _ratios(found: Sequence[Trial], name: str, over: str, under: str) -> list[float]:
-    """Return the ratios of shares that are known, of numbers that are not unknown anyway."""
+    """Return the ratios where both shares are known and the denominator is below 1."""
     pairs = [(getattr(one, over).get(name), getattr(one, under).get(name)) for one in found]
     return [
         above / below
@@ -176,7 +176,7 @@ def _ratios(found: Sequence[Trial], name: str, over: str, under: str) -> list[fl
 
 
 def report(found: Sequence[Trial]) -> str:
-    """Return the table: medians, with the 10 and 90 % quantiles and the count."""
+    """Return the table of medians, with 10 and 90 % quantiles and counts."""
     lines = []
     for law in (*_LAWS, "all"):
         some = [one for one in found if law in (one.law, "all")]

@@ -7,10 +7,10 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""A valve with a pneumatic positioner, simulated densely; it shares no code with the package.
+"""A valve with a pneumatic positioner, simulated in fine steps without code of the package.
 
-The stem has the set-valued friction of `benchmark.reality`; the air is compressed by the stem, the
-flow is limited, the positioner has a delay, a gain, and integral action or not.
+The stem has the set-valued friction of `benchmark.reality` and compresses the air. The air flow is
+limited. The positioner has a delay, a gain and optional integral action.
 """
 
 from dataclasses import dataclass
@@ -29,26 +29,26 @@ FAULTS = ("healthy", "sticky", "late", "slow", "setting")
 
 _BODY = Body(mass=1.6, spring=2.05e5, preload=250.0)
 _SPAN = _BODY.spring * _BODY.travel / _BODY.area
-"""Pressure of the whole travel, Pa."""
+"""Pressure change over the whole travel, Pa."""
 
 
 class Positioner(NamedTuple):
-    """A positioner: proportional (pressure per error) or integrating (flow per error).
+    """A proportional (pressure per error) or integrating (flow per error) positioner.
 
     Attributes
     ----------
     gain : float
-        Change of the pressure, in spans, per travel of error; per second, where it integrates.
+        Pressure change, in spans, per error, in travels; per second for an integrating positioner.
     integral : float
-        Further rate per error of a proportional one, 1/s; 0: no integral action.
+        Integral rate per error of a proportional positioner, 1/s; 0 for no integral action.
     rate : float
-        Largest rate of the pressure, spans a second.
+        Largest rate of the pressure, spans per second.
     lag, delay, offset : float
-        Lag of the amplifier, s; delay, s; error of the calibration, share of the travel.
+        Lag of the amplifier, s; delay, s; calibration error, share of the travel.
     integrates : bool
         Whether flow, not pressure, is proportional to the error.
     dead_zone : float
-        Error, share of the travel, that it does not act on.
+        Error, share of the travel, without effect.
     """
 
     gain: float
@@ -63,7 +63,7 @@ class Positioner(NamedTuple):
 
 @dataclass(frozen=True)
 class Case:
-    """A fault, the valve and the positioner that have it, and the noise of their sensors."""
+    """A fault with its valve, its positioner, and the noise of their sensors."""
 
     fault: str
     friction: Friction
@@ -75,7 +75,7 @@ class Case:
 
 
 class Record(NamedTuple):
-    """Stamps, s, of each signal; command and position, share of the travel; pressure, Pa."""
+    """Command and position, shares of the travel, and pressure, Pa, each with stamps, s."""
 
     command_stamps: NDArray[np.float64]
     command: NDArray[np.float64]
@@ -129,7 +129,7 @@ def _run(
     span: float,
     outputs: NDArray[np.float64],
 ) -> None:
-    """Fill the rows of `outputs`, position (share) and pressure, at every `each` steps."""
+    """Fill the rows of `outputs`, position (share) and pressure, every `each` steps."""
     state = np.zeros(INNER + 6)
     state[X] = command[0] * c.travel
     balance = c.pressure_reference + (c.preload + c.spring * state[X]) / c.area
@@ -152,7 +152,7 @@ def _run(
             rate = (due - pressure) / (span * p.lag)
         sent += STEP / p.lag * (rate - sent) if p.integrates else rate - sent
         limited = min(max(sent, -p.rate), p.rate)
-        squeezed = -0.3 * state[V] / c.travel  # the stem makes room, or takes it
+        squeezed = -0.3 * state[V] / c.travel  # the moving stem expands or compresses the air
         pressure += STEP * span * (limited + squeezed)
         pressure = min(max(pressure, 0.5 * c.pressure_reference), 2.5 * span)
         pull = c.area * (pressure - c.pressure_reference) - c.preload - c.spring * state[X]
@@ -168,7 +168,7 @@ def _run(
 
 
 def steps(rng: np.random.Generator, count: int, largest: float) -> list[tuple[float, float]]:
-    """Draw a schedule: seconds of each hold, and the command there."""
+    """Draw a schedule of hold times, s, and commands."""
     level, schedule = 0.5, [(8.0, 0.5)]
     for _ in range(count):
         size = rng.uniform(0.005, largest) * rng.choice([-1.0, 1.0])
@@ -180,7 +180,7 @@ def steps(rng: np.random.Generator, count: int, largest: float) -> list[tuple[fl
 
 
 def simulated(case: Case, seed: int, schedule: list[tuple[float, float]]) -> Record:
-    """Simulate a case, and sample its signals with noise, each at stamps of its own."""
+    """Simulate a case, and sample each signal with noise and its own stamps."""
     rng = np.random.default_rng([seed, 7])
     each = 10
     dense = np.concatenate([np.full(round(s / STEP / each), u) for s, u in schedule])

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The results as tables, and as one picture."""
+"""The results as tables and as one figure."""
 
 import statistics
 from collections import Counter
@@ -64,7 +64,7 @@ def _row(outcomes: Sequence[Outcome]) -> list[str]:
 
 
 def cases_table(outcomes: Sequence[Outcome]) -> Table:
-    """Tabulate worst error, verdicts and coverage of each parameter, a row a case."""
+    """Tabulate worst error, verdicts and coverage of each parameter, with a row per case."""
     columns = ("valve", "excitation", "noise", "rate", "n", "refused", "F_c", "F_v", "k", "F_s")
     title = "worst error in %, verdicts (i identified, w weak, n not identifiable), coverage"
     table = Table(*columns, "force %", "s", "bounds", title=title)
@@ -74,7 +74,7 @@ def cases_table(outcomes: Sequence[Outcome]) -> Table:
 
 
 def bounds_table(bounds: Sequence[Bound]) -> Table:
-    """Tabulate the requirements, those that hold for many cases only where they are missed."""
+    """Tabulate the requirements; list those for many cases only where they are missed."""
     table = Table("requirement", "reached", "", title="requirements")
     for bound in bounds:
         if not (bound.met and bound.reached in ("always", "shown 0×")):
@@ -120,7 +120,7 @@ def draw(
     alarms: AlarmCounts | None,
     path: Path,
 ) -> None:
-    """Draw errors, coverage, friction forces and alarms; what was not run stays empty."""
+    """Draw errors, coverage, friction forces and alarms; panels of parts not run stay empty."""
     figure = Figure(figsize=(14, 11), layout="constrained")
     (errors, covered), (forces, ratios) = figure.subplots(2, 2)
     figure.suptitle("Accuracy of the method bench on simulated valves")
@@ -138,7 +138,7 @@ def _is_main(outcome: Outcome) -> bool:
 
 
 def _draw_errors(axes: Axes, outcomes: Sequence[Outcome]) -> None:
-    """Every error at the main noise, over what is allowed."""
+    """Draw all errors at the main noise, over their limits."""
     groups = by_case([outcome for outcome in outcomes if _is_main(outcome)])
     labels: list[str] = []
     for case, group in groups.items():
@@ -175,7 +175,7 @@ def _draw_coverage(axes: Axes, outcomes: Sequence[Outcome]) -> None:
 
 
 def _draw_forces(axes: Axes, outcomes: Sequence[Outcome]) -> None:
-    """Worst error of the friction force, a column for each valve and excitation."""
+    """Draw the worst error of the friction force, with a column per valve and excitation."""
     columns = list(dict.fromkeys((one.case.plant_name, one.case.excitation) for one in outcomes))
     for index, (noise, colour) in enumerate(_COLOURS.items()):
         for condition, marker in (("1 kHz", "o"), ("100 Hz", "x")):

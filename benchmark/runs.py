@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""One identification of a benchmark record, and how far it is from the truth."""
+"""One identification of a benchmark record, and its distance from the truth."""
 
 import math
 import time
@@ -30,10 +30,10 @@ from valve_friction_ros.model import StemState, simulate
 _FREE = ("coulomb_friction", "viscous_friction", "spring_constant", "spring_preload")
 _SLIP, _START = "static_friction", "start"
 _STEP = 1e-4
-"""Change of a parameter, and of the start over the travel, by which the stem is differentiated."""
+"""Step of the numerical derivatives: relative for a parameter, over the travel for the start."""
 
 _SLOWEST = 1e-5
-"""Speed below which the stem holds its place whatever the pressure sensor says, m/s."""
+"""Speed, m/s, below which the stem is at rest, so that noise of the pressure does not matter."""
 
 
 @dataclass(frozen=True)
@@ -45,9 +45,9 @@ class Information:
     plant_name, noise : str
         Valve and sensor noise.
     pressure_known : dict of str to float
-        Relative standard errors where the pressure is known exactly.
+        Relative standard errors if the pressure is known exactly.
     pressure_measured : dict of str to float
-        The same where it is known by its noisy samples alone.
+        Relative standard errors if the pressure is known only from its noisy samples.
     """
 
     plant_name: str
@@ -59,7 +59,7 @@ class Information:
 def _stem(
     plant: Plant, pressure: NDArray[np.float64], start: float, name: str, step: float
 ) -> NDArray[np.float64]:
-    """Simulate with one parameter changed by a share of itself; F_s follows F_c without a slip."""
+    """Simulate with one parameter changed by a relative step; F_s − F_c stays constant."""
     parameters = plant.parameters
     if name == _START:
         start += step * plant.valve.travel
@@ -75,11 +75,11 @@ def _stem(
 def information(plant_name: str, noise: str) -> Information:
     """Compute the Cramér–Rao bound of a Karnopp valve on the square wave at 1 kHz.
 
-    The Fisher information is SᵀW⁻¹S with the sensitivities S of the true model's stem. White
-    noise of the stem sensor alone gives W = σ_x². That of the pressure sensor moves the predicted
-    stem of a sliding valve by S_a/k of it (the valve's own lag shifts none of it at the slow rates
-    of the sensitivities), which adds (σ_P·S_a/k)² wherever the stem slides. A method that knows
-    the pressure to be smooth, as behind a lag, may come between the two.
+    The Fisher information is SᵀW⁻¹S with the sensitivities S of the true model's stem. White noise
+    of the stem sensor alone gives W = σ_x². Noise of the pressure sensor moves the predicted stem
+    of a sliding valve by the factor S_a/k (the valve's own lag is negligible at the slow rates of
+    the sensitivities). This adds (σ_P·S_a/k)² wherever the stem slides. A method that knows the
+    pressure to be smooth, for example behind a lag, may lie between the two.
     """
     plant, sensors = PLANTS[plant_name], NOISES[noise]
     recording, parameters = clean_record(plant_name, "square"), plant.parameters
@@ -106,7 +106,7 @@ def information(plant_name: str, noise: str) -> Information:
 
 
 SETTINGS = IdentificationSettings(assumed_mass=1.6)
-"""Those of the bench valves' configuration."""
+"""Settings from the configuration of the bench valves."""
 
 TRUE_NAMES = (
     "coulomb_friction",
@@ -116,7 +116,7 @@ TRUE_NAMES = (
     "spring_preload",
     "stribeck_velocity",
 )
-"""Parameters that are compared with the truth."""
+"""Parameters to compare with the truth."""
 
 _MOVING = 0.01
 _LARGEST_CLAIM = 0.05
@@ -125,26 +125,26 @@ _LARGEST_INTERVALS = 3.0
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of one record.
+    """The outcome of one record.
 
     Attributes
     ----------
     case : Case
         The combination that was run.
     seed : int
-        Seed of its noise.
+        Seed of the noise.
     seconds : float
-        Time it took.
+        Time of the identification, s.
     refusal : str
         Reason of a refusal; else empty.
     errors, half_widths : dict of str to float
-        Relative to the true value, by parameter; nan where nothing was answered.
+        Errors and half widths relative to the true value, by parameter; nan without a value.
     verdicts : dict of str to str
-        By parameter.
+        Verdicts by parameter.
     force_error : float
         Worst relative error of the friction force over the speeds of the record.
     misfit, tolerated : float
-        Systematic misfit and what of it is tolerated, m.
+        Systematic misfit and its tolerated size, m.
     """
 
     case: Case
@@ -161,7 +161,7 @@ class Outcome:
 
 @cache
 def run_speeds(plant_name: str, excitation: str) -> NDArray[np.float64]:
-    """Speeds, m/s, from the 5th to the 95th percentile of those of the moving stem."""
+    """Return speeds, m/s, from the 5th to the 95th percentile of the speeds of the moving stem."""
     position = clean_record(plant_name, excitation).position
     speed = np.abs(np.diff(position)) / PERIOD
     lowest, highest = np.quantile(speed[speed > _MOVING * speed.max()], (0.05, 0.95))
@@ -169,7 +169,7 @@ def run_speeds(plant_name: str, excitation: str) -> NDArray[np.float64]:
 
 
 def force_error(case: Case, result: Result) -> float:
-    """Return the worst relative error of the friction force, both ways."""
+    """Return the worst relative error of the friction force in both directions."""
     speeds = run_speeds(case.plant_name, case.excitation)
     velocities = np.concatenate([-speeds, speeds])
     truth = case.plant.parameters.sliding_friction(velocities)
@@ -178,7 +178,7 @@ def force_error(case: Case, result: Result) -> float:
 
 
 def run(case: Case, seed: int, method: str = "bench") -> Outcome:
-    """Identify one record and compare with the truth."""
+    """Identify one record, and compare the result with the truth."""
     recording = case.record(seed)
     begin = time.perf_counter()
     try:
@@ -205,7 +205,7 @@ def run(case: Case, seed: int, method: str = "bench") -> Outcome:
 
 
 def wrong_claims(outcome: Outcome) -> list[str]:
-    """Parameters called identified that are beyond 5 %, or beyond three times their interval."""
+    """Return identified parameters with errors above 5 % or three half widths."""
     wrong = []
     for name, error in outcome.errors.items():
         allowed = min(_LARGEST_CLAIM, _LARGEST_INTERVALS * outcome.half_widths[name])

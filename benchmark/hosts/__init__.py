@@ -7,4 +7,4 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""A plant of many hosts on one machine: network namespaces on a bridge, and what is cut there."""
+"""A plant of many hosts on one machine: network namespaces on a bridge, and failures there."""

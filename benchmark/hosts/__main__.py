@@ -32,10 +32,10 @@ from benchmark.harness.rows import Row, judged, logged, opened_console, rows_tab
 _BRIDGE = "vfbridge"
 _NETWORK = "10.77.0"
 OUTSIDE = f"{_NETWORK}.254"
-"""Address at which the hosts reach this machine, and its database."""
+"""Address of this machine and its database, as seen from the hosts."""
 _IP = shutil.which("ip") or "/sbin/ip"
 _OWN_SHARED_MEMORY = 'mount -t tmpfs tmpfs /dev/shm; exec "$@"'
-"""Processes of two hosts would otherwise meet in the shared memory of the machine."""
+"""Gives each host its own shared memory; otherwise processes of two hosts would meet there."""
 
 
 def _ip(*words: str) -> str:
@@ -44,7 +44,7 @@ def _ip(*words: str) -> str:
 
 
 class Traffic(NamedTuple):
-    """What has gone over the cable of a host: bytes and packets, sent and received by the host."""
+    """Traffic on the cable of a host: bytes and packets, sent and received by the host."""
 
     sent: int
     received: int
@@ -52,7 +52,7 @@ class Traffic(NamedTuple):
     packets_received: int
 
     def since(self, earlier: "Traffic") -> "Traffic":
-        """Return what has gone since then."""
+        """Return the traffic since then."""
         return Traffic(*(now - then for now, then in zip(self, earlier, strict=True)))
 
 
@@ -65,7 +65,7 @@ class Host:
         self._cable = f"vfcable{number}"
 
     def make(self) -> None:
-        """Make the namespace and its cable."""
+        """Create the namespace and its cable."""
         inside = ("-n", self.name)
         _ip("netns", "add", self.name)
         _ip("link", "add", self._cable, "type", "veth", "peer", "name", "eth0", "netns", self.name)
@@ -76,7 +76,7 @@ class Host:
         _ip(*inside, "route", "add", "default", "dev", "eth0")
 
     def remove(self) -> None:
-        """End what runs there, and remove the namespace with its cable."""
+        """End all processes, and remove the namespace with its cable."""
         with contextlib.suppress(subprocess.CalledProcessError):
             self.kill()
             _ip("netns", "delete", self.name)
@@ -87,21 +87,21 @@ class Host:
         return Process([_IP, "netns", "exec", self.name, *shell])
 
     def start_module(self, name: str, *arguments: str) -> Process:
-        """Run a module of Python on the host."""
+        """Run a Python module on the host."""
         return self.start(module(name, *arguments))
 
     def kill(self) -> None:
-        """End all processes of the host at once, as the loss of its power does."""
+        """Kill all processes of the host at once, like a power failure."""
         for process in _ip("netns", "pids", self.name).split():
             with contextlib.suppress(ProcessLookupError):
                 os.kill(int(process), signal.SIGKILL)
 
     def plug(self, is_in: bool) -> None:
-        """Put the plug of the cable into the bridge, or pull it."""
+        """Plug the cable into the bridge, or unplug it."""
         _ip("link", "set", self._cable, "up" if is_in else "down")
 
     def traffic(self) -> Traffic:
-        """Return what has gone over the cable."""
+        """Return the traffic on the cable so far."""
         counters = Path(f"/sys/class/net/{self._cable}/statistics")
         # This end of the cable receives what the host sends.
         names = ("rx_bytes", "tx_bytes", "rx_packets", "tx_packets")
@@ -110,7 +110,7 @@ class Host:
 
 @contextlib.contextmanager
 def network(count: int) -> Iterator[list[Host]]:
-    """Provide hosts that see nothing but each other and `OUTSIDE`; needs root."""
+    """Provide hosts that see only each other and `OUTSIDE`; needs root."""
     hosts = [Host(number) for number in range(count)]
     _ip("link", "add", _BRIDGE, "type", "bridge", "mcast_snooping", "0")
     try:
@@ -128,12 +128,12 @@ def network(count: int) -> Iterator[list[Host]]:
 _SERVER_PORT = 11811
 _START = 600.0
 _PATIENCE = 120.0
-"""Longest times, s, to the first complete picture and to a later one."""
+"""Longest times, s, to the first complete picture and to a later complete picture."""
 _TRUTH = 6.0
-"""Time, s, within which the dashboard shall show what has happened: its silence of 5 s, and the
-second between two messages of a valve."""
+"""Time limit, s, for the dashboard to show an event: its silence of 5 s, and the second between two
+messages of a valve."""
 _ASKED = 5
-"""Valves of a host that are identified while it is cut off, and before it dies."""
+"""Valves per host to identify while the host is cut off, and before it dies."""
 _LOOK, _LOOK_AT_DATABASE = 0.1, 0.2
 _COUNT = """
 SELECT count(*) FROM identification JOIN valve ON valve.id = valve_id WHERE valve.name LIKE %s
@@ -141,7 +141,7 @@ SELECT count(*) FROM identification JOIN valve ON valve.id = valve_id WHERE valv
 
 
 class Group(NamedTuple):
-    """The valves of one host: those shown as heard and as silent, and the fewest samples held."""
+    """The valves of one host: numbers shown as heard and as silent, and fewest samples held."""
 
     heard: int = 0
     silent: int = 0
@@ -149,7 +149,7 @@ class Group(NamedTuple):
 
 
 class Picture:
-    """What the dashboard shows: the newest line that it has printed, read in a thread."""
+    """The picture on the dashboard: its latest printed line, read in a thread."""
 
     def __init__(self, process: Process) -> None:
         self._process = process
@@ -162,13 +162,13 @@ class Picture:
             self._groups = {name: Group(**group) for name, group in found.items()}
 
     def group(self, name: str) -> Group:
-        """Return what is shown of the valves of a host."""
+        """Return the shown state of the valves of a host."""
         return self._groups.get(name, Group())
 
     def time_until(
         self, is_met: Callable[[], bool], patience: float, begin: float | None = None
     ) -> float:
-        """Wait until the picture is so; return the time since `begin` or now, s; inf if never."""
+        """Wait for a condition; return the time since `begin` or now, s, or inf on timeout."""
         begin = time.monotonic() if begin is None else begin
         while not is_met():
             if time.monotonic() - begin > patience:
@@ -179,7 +179,7 @@ class Picture:
 
 
 class Database:
-    """A server, outside of the hosts, that all send their history to from files of their own."""
+    """A server outside the hosts, to which all send the history from their own files."""
 
     def __init__(self, server: PostgresServer, folder: Path) -> None:
         self._server, self._folder = server, folder
@@ -191,16 +191,16 @@ class Database:
         return ["--history", str(file), "--history-url", url]
 
     def count(self, host: str) -> int:
-        """Return the identifications of a host's valves that are on the server."""
+        """Return the number of identifications on the server for the valves of a host."""
         if not self._server.do(self._name, "SELECT to_regclass('identification')")[0][0]:
-            return 0  # nobody has sent anything
+            return 0  # no host has sent anything
         ((count,),) = self._server.do(self._name, _COUNT, (f"/{host}\\_%",))
         return int(count)
 
     def rows(
         self, host: str, words: str, answered: int, patience: float, begin: float
     ) -> Iterator[Row]:
-        """Wait until all that a host has answered is on the server."""
+        """Wait until the server has all identifications that a host has answered."""
         while self.count(host) < answered and time.monotonic() < begin + patience:
             time.sleep(_LOOK_AT_DATABASE)
         kept = self.count(host)
@@ -212,13 +212,13 @@ class Database:
 
 @contextlib.contextmanager
 def _database() -> Iterator[Database | None]:
-    """Provide a new database on a new server; None where no server can be started."""
+    """Provide a new database on a new server, or None if no server can be started."""
     with running_server(OUTSIDE) as server, tempfile.TemporaryDirectory() as folder:
         yield None if server is None else Database(server, Path(folder))
 
 
 class _Running:
-    """What runs on one host with valves."""
+    """The processes on one host with valves."""
 
     def __init__(
         self, host: Host, name: str, options: argparse.Namespace, kept: Sequence[str]
@@ -231,11 +231,11 @@ class _Running:
         self._identifiers = int(self.process.output.readline())
 
     def samples_sent(self) -> int:
-        """Wait until the source has sent all; return how many samples of both signals."""
+        """Wait until the source has sent everything; return the samples of both signals."""
         return 2 * int(self.process.output.readline())
 
     def ask(self) -> int:
-        """Have some of its valves identified, by somebody on the host; return the answers."""
+        """Identify some of its valves by a client on the host; return the number of answers."""
         valves = [f"{self.name}_{number}" for number in range(_ASKED)]
         with self.host.start_module("benchmark.hosts.host", *valves, "--ask") as asker:
             return int(asker.output.read() or 0)
@@ -249,7 +249,7 @@ class _Running:
 
 
 class _Plant:
-    """The dashboard and the hosts, with what they use and show."""
+    """The dashboard and the hosts, with their resource use and picture."""
 
     def __init__(
         self, hosts: Sequence[Host], options: argparse.Namespace, database: Database | None
@@ -268,7 +268,7 @@ class _Plant:
         return _Running(host, name, self._options, kept)
 
     def is_shown(self, one: _Running) -> bool:
-        """Whether all valves of a host are shown, and none is silent."""
+        """Whether all valves of a host are shown, none of them silent."""
         group = self.picture.group(one.name)
         return (group.heard, group.silent) == (one.valves, 0)
 
@@ -280,7 +280,7 @@ class _Plant:
         return all(map(self.is_shown, self.hosts))
 
     def truth(self, item: str, is_met: Callable[[], bool]) -> Row:
-        """Wait until the picture is so, which it shall be soon."""
+        """Wait for a condition of the picture, with the goal `_TRUTH`."""
         took = self.picture.time_until(is_met, _PATIENCE)
         return Row(item, took, "s", goal=f"within {_TRUTH:g} s", met=took <= _TRUTH)
 
@@ -301,7 +301,7 @@ def _started(options: argparse.Namespace) -> Iterator[_Plant]:
 
 
 class _Use(NamedTuple):
-    """What all has used until a time."""
+    """Total resource use up to a time."""
 
     time: float
     identifiers: float
@@ -332,7 +332,7 @@ def _at_start(plant: _Plant) -> Iterator[Row]:
 
 
 def _in_service(plant: _Plant, seconds: float) -> Iterator[Row]:
-    """Measure what the plant costs while nothing happens."""
+    """Measure the cost of the plant while nothing happens."""
     time.sleep(min(15.0, seconds / 2))  # the discovery ends
     before = _used(plant)
     time.sleep(seconds / 2)
@@ -350,10 +350,10 @@ def _in_service(plant: _Plant, seconds: float) -> Iterator[Row]:
 
 
 def _death(plant: _Plant) -> Iterator[Row]:
-    """Kill a host, and start it again."""
+    """Kill a host, and restart it."""
     dead, others, database = plant.hosts[0], plant.hosts[1:], plant.database
     answered = dead.ask() if database else 0
-    dead.host.kill()  # what it has kept may wait still
+    dead.host.kill()  # its stored rows may still wait for the server
     dead.process.kill()
     silent = plant.truth("a host dies: its valves are silent", lambda: plant.is_silent(dead))
     rest = all(map(plant.is_shown, others))
@@ -368,7 +368,7 @@ def _death(plant: _Plant) -> Iterator[Row]:
 
 
 def _partition(plant: _Plant, seconds: float) -> Iterator[Row]:
-    """Pull the plug of a host for a while."""
+    """Unplug a host for a while."""
     cut, database = plant.hosts[-1], plant.database
     begin = time.monotonic()
     cut.host.plug(False)
@@ -390,7 +390,7 @@ def _partition(plant: _Plant, seconds: float) -> Iterator[Row]:
 
 
 def _at_end(plant: _Plant) -> Iterator[Row]:
-    """Count the samples that the identifiers hold, once the sources have sent all."""
+    """Count the samples in the identifiers after the sources have sent everything."""
     for one in plant.hosts[1:]:
         sent = one.samples_sent()
 

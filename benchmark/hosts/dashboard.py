@@ -7,10 +7,11 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The dashboard's node without its pages: prints what a page would show of the plant, as JSON.
+"""The dashboard's node without pages: prints the state of the plant as JSON.
 
-A line every 0.2 s: the time, and for each first part of the valves' names how many valves are
-shown as heard and as silent, and the fewest samples that one of its identifiers holds.
+Every 0.2 s it prints a line with the time and, per host, the numbers of valves shown as heard and
+as silent, and the fewest samples in any of its identifiers. The first part of a valve's name is its
+host.
 """
 
 import json
@@ -34,7 +35,7 @@ def _group_of(identifier: str) -> str:
 
 
 def _picture(node: Dashboard) -> _Groups:
-    """Return what the page of the plant reads, at its pace."""
+    """Return the data of the plant page, at its refresh rate."""
     groups: _Groups = defaultdict(lambda: {"heard": 0, "silent": 0})
     for valve in node.plant.valves(time.monotonic()):
         groups[_group_of(valve.view.node)]["silent" if valve.is_silent else "heard"] += 1
@@ -42,7 +43,7 @@ def _picture(node: Dashboard) -> _Groups:
 
 
 def _fewest(node: Dashboard) -> dict[str, int]:
-    """Return what the page of a valve reads, of all valves: it takes longer."""
+    """Return the fewest samples per host, from the data of all valve pages, which takes longer."""
     now, fewest = time.monotonic(), dict[str, int]()
     for one in node.plant.valves(now):
         valve, group = node.plant.valve(one.view.node, now), _group_of(one.view.node)
@@ -52,7 +53,7 @@ def _fewest(node: Dashboard) -> dict[str, int]:
 
 
 def main() -> int:
-    """Listen and print until the process is told to end."""
+    """Listen and print until a stop signal."""
     rclpy.init(args=sys.argv, signal_handler_options=rclpy.signals.SignalHandlerOptions.NO)
     node, executor, due, counted = Dashboard(), TurnExecutor(), 0.0, 0.0
     fewest: dict[str, int] = {}

@@ -26,7 +26,7 @@ _PATIENCE = 300.0
 
 
 def _ask(options: argparse.Namespace) -> None:
-    # Who is started later has a shared memory of its own, and the host would be sought there.
+    # A process started later has its own shared memory, and would look for the host there.
     os.environ["FASTDDS_BUILTIN_TRANSPORTS"] = "UDPv4"
     answered = 0
     with caller(lambda: True) as client:
@@ -37,7 +37,7 @@ def _ask(options: argparse.Namespace) -> None:
 
 
 def _serve(options: argparse.Namespace) -> None:
-    """Start both processes, and end them with the input."""
+    """Start both processes, and end them when the input ends."""
     given = parameters(
         valves=f"[{','.join(options.valves)}]",
         history_file=options.history,

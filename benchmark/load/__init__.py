@@ -7,4 +7,4 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The dashboard under the load of a plant, as a browser meets it."""
+"""The dashboard under the load of a plant, as seen from a browser."""

@@ -41,16 +41,16 @@ from benchmark.load.stage import (
 
 _LOOK = 10.0
 _SETTLED = 0.3
-"""Share of the time after which all that is kept once has been kept."""
+"""Share of the run after which all caches are filled."""
 _GROWTH = 10.0
-"""Growth of the memory from then on, MB, that counts as steady. Chosen: 5 % of the bound."""
+"""Largest growth of steady memory after that, MB. Chosen: 5 % of the bound."""
 _TABS = 4
 _PATIENCE = 60_000.0
-"""Longest time until a page is connected, ms."""
+"""Longest time for a page to connect, ms."""
 
 
 class _Look(NamedTuple):
-    """What the dashboard holds at a time, s, and how many pages were opened until then."""
+    """Resources of the dashboard at a time, s, and the number of pages opened so far."""
 
     time: float
     memory: float
@@ -61,7 +61,7 @@ class _Look(NamedTuple):
 
 
 def _heap(page: Page) -> float:
-    """Return the memory that a page's scripts hold in the browser, MB."""
+    """Return the memory of a page's scripts in the browser, MB."""
     session = page.context.new_cdp_session(page)
     session.send("HeapProfiler.collectGarbage")
     session.send("Performance.enable")
@@ -88,7 +88,7 @@ class _Visitor:
         return self._chance.choice(pages_of(self._stage.valves, valve)[1:] + _searches())
 
     def turn(self) -> None:
-        """Open a page, in a new tab or in one that is there, or use one, or close one."""
+        """Open a page in a new or an existing tab, reload a tab, or close one."""
         self.pages += 1
         chance = self._chance.random()
         if not self._tabs or (chance < 0.4 and len(self._tabs) < _TABS):
@@ -97,7 +97,7 @@ class _Visitor:
         elif chance < 0.75:
             tab = self._chance.choice(self._tabs)
             tab.goto(self._stage.address + self._draw().path, wait_until="commit")
-            # An evaluation of a page that is just being left may never come back.
+            # An evaluation on a page that is being left may never return.
             tab.wait_for_function("window.did_handshake", polling=50, timeout=_PATIENCE)
         elif chance < 0.85:
             self._chance.choice(self._tabs).reload(wait_until="commit")
@@ -141,12 +141,12 @@ def _looks(
 
 
 def _growth(times: np.ndarray, values: np.ndarray) -> float:
-    """Return by how much a straight line through the values grows over the times."""
+    """Return the growth of a straight line fitted to the values."""
     return float(np.polyfit(times, values, 1)[0] * (times[-1] - times[0]))
 
 
 def afternoon_rows(stage: Stage, browser: Browser, minutes: float, seed: int) -> Iterator[Row]:
-    """Use the dashboard for some minutes, and compare what it holds early and late."""
+    """Use the dashboard for some minutes, and compare its early and late resources."""
     file = stage.folder / "afternoon.csv"
     looks = np.array(list(_looks(browser, stage, 60 * minutes, seed, file)))
     late = looks[looks[:, 0] > _SETTLED * looks[-1, 0]]
@@ -171,12 +171,12 @@ _QUIET_FOR = 5.0
 
 
 def _times_row(item: str, times: Sequence[float], limit: float) -> Row:
-    """Return the longest of some times, beside their median."""
+    """Return the longest of several times, with their median as peer."""
     return at_most(item, max(times), "s", limit, statistics.median(times), "median")
 
 
 def _ready(browser: Browser, address: str, one: Visit, repeats: int) -> Iterator[Row]:
-    """Measure first visits, with nothing kept, and later ones."""
+    """Measure first visits, without a cache, and later visits."""
     first, later = [], []
     for _ in range(repeats):
         with browser.new_context(viewport={"width": 1400, "height": 900}) as context:
@@ -187,7 +187,7 @@ def _ready(browser: Browser, address: str, one: Visit, repeats: int) -> Iterator
 
 
 def _acknowledged(browser: Browser, stage: Stage, alarms: Visit) -> Row:
-    """Measure how long all alarms of the plant take to be acknowledged."""
+    """Measure the time to acknowledge all alarms of the plant."""
     with browser.new_context() as context:
         page = visit(context, stage.address, alarms)[1]
         page.get_by_role("button", name="Acknowledge all").click()
@@ -219,7 +219,7 @@ def _usage_rows(
 
 
 def _healed(stage: Stage, launch: Callable[[], Browser], repeats: int) -> Iterator[Row]:
-    """Measure restarts by kill -9, from the kill to the page that shows the new state."""
+    """Measure restarts after kill -9, from the kill until the page shows the new state."""
     plant = Visit("plant", "/?sort=-tag", pages_of(stage.valves, LIVE)[0].is_ready)
     is_live = f"{plant.is_ready} && window.did_handshake && {ALL_HEARD}"
     times: dict[str, list[float]] = {"identifier": [], "dashboard": [], "browser": []}
@@ -281,7 +281,7 @@ _THEMES = ("light", "dark")
 _SIGNALS = 20_000
 """Time for the signals of a valve to fill their charts, ms."""
 _SETTLE = 2500
-"""Time for a page to draw all that comes after it, ms."""
+"""Time for a page to finish drawing, ms."""
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -308,7 +308,7 @@ def _take_manual_picture(stage: Stage, browser: Browser, path: Path) -> None:
 
 
 def _picture_rows(stage: Stage, browser: Browser, folder: Path) -> Iterator[Row]:
-    """Take pictures of all pages, to be looked at; count those that are wider than their window."""
+    """Take pictures of all pages for inspection; count pages wider than their window."""
     folder.mkdir(parents=True, exist_ok=True)
     live, other = quote(LIVE), quote(identifier_of(2))
     pages = {
@@ -338,7 +338,7 @@ def _picture_rows(stage: Stage, browser: Browser, folder: Path) -> Iterator[Row]
 
 
 def _measured(options: argparse.Namespace, stage: Stage) -> Iterator[tuple[str, list[Row]]]:
-    """Run the parts, each before a plant of its own."""
+    """Run the parts, each with its own plant."""
     with running(stage.processes), launched() as launch:
         stage.prepare()
         if "bounds" in options.parts:

@@ -34,7 +34,7 @@ from valve_friction_ros.nodes.plumbing.qos import LATCHED
 
 _BEGIN = time.time()
 _BEATS = 4
-"""Seconds after which the counters of a valve begin again."""
+"""Beats after which the counters of a valve repeat."""
 _COUNTERS = ("reversals", "breakaways", "buffered_samples")
 _KINDS = (
     (0, "", 1.0, "friction normal"),
@@ -55,12 +55,12 @@ _AWKWARD = {
     8: '<b>"bold"</b> & so on',
     11: "V",
 }
-"""Tags that are hard to draw."""
+"""Tags that are difficult to draw."""
 _SCALED = ("coulomb_friction", "sliding_friction", "dead_band", "static_friction")
 
 
 def ratio_of(index: int) -> float | None:
-    """Return the friction of a valve over its baseline; None where it has none."""
+    """Return the friction of a valve over its baseline, or None without a baseline."""
     ratio = _KINDS[index % len(_KINDS)][2]
     return None if math.isnan(ratio) else ratio
 
@@ -76,7 +76,7 @@ def tag_of(index: int) -> str:
 
 
 def status_of(template: DiagnosticStatus, index: int, beat: int) -> DiagnosticStatus:
-    """Return what the identifier of a valve says at a beat: the template, with its own numbers."""
+    """Return the status of a valve at a beat: the template with its own numbers."""
     anew = beat >= _BEATS
     chance = random.Random(1000 * index + (beat if anew else 0))
     level, letter, ratio, words = _KINDS[index % len(_KINDS)]
@@ -109,7 +109,7 @@ def status_of(template: DiagnosticStatus, index: int, beat: int) -> DiagnosticSt
 
 
 def _own(value: KeyValue, beat: int, size: float, ratio: float) -> str:
-    """Return a value of a valve whose friction is larger, and has grown, by factors."""
+    """Return a value for a valve with friction scaled by `size` and grown by `ratio`."""
     if value.key.partition(" ")[0] in _COUNTERS:
         return str(15_000 + beat % _BEATS)
     factor = size if value.key.startswith("baseline") else size * ratio
@@ -124,7 +124,7 @@ def _diagnostics(status: DiagnosticStatus) -> bytes:
 
 
 def _due(count: int, rate: float) -> Iterator[tuple[int, int]]:
-    """Yield beat and index of the valve that is due, evenly spread over each beat."""
+    """Yield beat and index of each valve when due, evenly spread over each beat."""
     begin, beat = time.monotonic(), 0
     while True:
         for index in range(count):
@@ -143,7 +143,7 @@ def _publish(
     tags: Mapping[int, str],
     every: int,
 ) -> Iterator[None]:
-    """Publish; at each beat the next valve is identified anew, if `every` is their number."""
+    """Publish; if `every` is the number of valves, identify the next valve at each beat."""
     diagnostics = node.create_publisher(DiagnosticArray, "/diagnostics", 1000)
     estimates = [
         node.create_publisher(DiagnosticStatus, f"{identifier_of(index)}/estimate", LATCHED)
@@ -156,7 +156,7 @@ def _publish(
     arrays = [[_diagnostics(status) for status in beats] for beats in known]
     latched = [[serialize_message(status) for status in beats] for beats in known]
     del known
-    print("publishing", flush=True)  # who has started it waits for this
+    print("publishing", flush=True)  # the parent process waits for this
     for beat, index in _due(count, rate):
         if index == beat % every and beat >= _BEATS and every == count:
             anew = status_of(template, index, beat)

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The plant, the dashboard and one real valve, as processes; and a real browser before them."""
+"""The plant, the dashboard and one real valve as processes, with a real browser."""
 
 import contextlib
 import math
@@ -83,7 +83,7 @@ def _entry(
 
 
 def write_history(path: Path, valves: int, weeks: int = 52) -> None:
-    """Write a file of histories of valves, an identification a week and an alarm each."""
+    """Write a history file with weekly identifications and an alarm for each valve."""
     now = time.time_ns()
     with writing(path) as connection:
         for index in range(valves):
@@ -106,16 +106,16 @@ def write_history(path: Path, valves: int, weeks: int = 52) -> None:
 LIVE = "/live_1/identifier"
 """The identifier of the real valve."""
 _RECORD = 14.0
-"""Length of its record, s: more than a period of its pressure."""
+"""Length of its record, s: more than one period of the pressure."""
 _ANSWER = 600.0
 _PATIENCE = 60.0
 _FIRST_SCREEN = 40
-"""Rows that a tall screen shows at once."""
+"""Number of rows on a tall screen."""
 ALL_HEARD = " && ".join(
     f"document.querySelector('.vf-filter.vf-{one} .vf-count')?.innerText === '0'"
     for one in ("silent", "unheard")
 )
-"""Whether a page of the plant counts no valve that is not heard."""
+"""Whether a plant page shows all valves as heard."""
 _LOOK = """
 (() => {
   const look = () => {
@@ -125,13 +125,13 @@ _LOOK = """
   };
   requestAnimationFrame(look);
 })()"""
-"""Notes, each time that a picture is drawn, whether the page is ready: drawn, and connected."""
+"""Checks at each animation frame whether the page is ready: drawn and connected."""
 
 Say = Callable[[str], None]
 
 
 class Stage:
-    """Starts the processes, and knows them; history and logs are in a folder."""
+    """Starts and keeps the processes; the folder contains history and logs."""
 
     def __init__(self, folder: Path, valves: int, say: Say) -> None:
         self.folder, self.valves, self.say, self._port = folder, valves, say, free_port()
@@ -151,7 +151,7 @@ class Stage:
         return self._start(f"valve_friction_ros.nodes.{name}", *words, *parameters(**given))
 
     def identifier(self, tag: str) -> None:
-        """Start the identifier of the real valve, under a tag."""
+        """Start the identifier of the real valve with a tag."""
         known = {"valve_tag": tag, "history_file": self._history, "window": 60.0}
         self.live = self._node("identifier", "/live_1", **known)
 
@@ -170,14 +170,14 @@ class Stage:
 
     @contextlib.contextmanager
     def shown(self, rate: float, *more: str) -> Iterator[Process]:
-        """Provide a plant that the dashboard shows."""
+        """Provide a plant shown by the dashboard."""
         with self.plant(rate, *more) as plant:
             self.show()
             yield plant
         self.dashboard.end()
 
     def prepare(self) -> None:
-        """Write the history, and let a real valve say what the simulated ones will say."""
+        """Write the history, and record a real status as template for the simulated valves."""
         self.say(f"writing the history of {self.valves} valves")
         write_history(self._history, self.valves)
         self.say("identifying a simulated valve by real nodes")
@@ -196,7 +196,7 @@ class Stage:
 
 
 def _heard() -> bytes:
-    """Return the next status of the real valve that has a ratio, serialised."""
+    """Return the next status of the real valve with a ratio, serialised."""
     found: list[DiagnosticStatus] = []
 
     def note(message: DiagnosticArray) -> None:
@@ -215,14 +215,14 @@ def _heard() -> bytes:
 
 
 class Visit:
-    """A page to measure: its path, and the expression that is true once it shows all it should."""
+    """A page to measure: its path, and an expression that is true once it is complete."""
 
     def __init__(self, name: str, path: str, is_ready: str) -> None:
         self.name, self.path, self.is_ready = name, path, is_ready
 
 
 def pages_of(valves: int, identifier: str) -> tuple[Visit, ...]:
-    """Return the pages with what each shows of so many valves, and of one of them."""
+    """Return the pages to visit for a plant of `valves` valves and for one identifier."""
     node = quote(identifier)
     valve = (
         "document.querySelector('.vf-parameters') "
@@ -252,7 +252,7 @@ def launched() -> Iterator[Callable[[], Browser]]:
 
 
 def visit(context: BrowserContext, address: str, one: Visit) -> tuple[float, Page]:
-    """Open a page in a new tab; return the time until it was ready, s, and the tab."""
+    """Open a page in a new tab; return the time until it is ready, s, and the tab."""
     page = context.new_page()
     page.add_init_script(_LOOK % one.is_ready)
     page.goto(address + one.path, wait_until="commit")
@@ -261,10 +261,10 @@ def visit(context: BrowserContext, address: str, one: Visit) -> tuple[float, Pag
 
 
 def wait_on_page(page: Page, expression: str) -> None:
-    """Wait until an expression is true, also over reloads."""
+    """Wait until an expression is true, even across reloads."""
     end = time.monotonic() + _PATIENCE
     while time.monotonic() < end:
-        with contextlib.suppress(Error):  # a page that is being loaded
+        with contextlib.suppress(Error):  # the page is loading
             if page.evaluate(f"Boolean({expression})"):
                 return
         page.wait_for_timeout(20)
