@@ -29,12 +29,12 @@ from benchmark.reality.trial import Row, Task, real_rows, rows_of, tried
 _PROCESSES = 2
 _PARTS = ("plain", "stickslip", "alarms")
 _RECORDS, _BRIEF = (50, 24, 12), (4, 2, 1)
-"""Of each motion, by default and in brief: in each of the parts."""
+"""Records of each motion in each part, by default and in brief."""
 
 _SLIPPING = (Kind.SQUARE, Kind.RAMP, Kind.LEVELS, Kind.MULTISINE, Kind.HUNTING)
 _WATCHED = (Kind.SQUARE, Kind.RAMP, Kind.LEVELS, Kind.MULTISINE, Kind.LOOP, Kind.FROM_MIDDLE)
 _RESERVE = 2.2
-"""Factor by which the friction of a valve that is watched may grow: it is doubled."""
+"""Factor by which the friction of a monitored valve may grow: the benchmark doubles it."""
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -76,7 +76,7 @@ def _tasks(options: argparse.Namespace, entropy: int) -> Iterator[Task]:
 
 
 def _run(options: argparse.Namespace, console: Console) -> list[Row]:
-    """Run all tasks, and write each row as it comes."""
+    """Run all tasks, and write each row as it arrives."""
     entropy = secrets.randbits(32) if options.entropy is None else options.entropy
     console.print(f"--entropy {entropy}")
     if options.save is not None:
@@ -97,7 +97,7 @@ def _run(options: argparse.Namespace, console: Console) -> list[Row]:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run what was asked for; return 1 if a bound is missed."""
+    """Run the requested parts; return 1 if a bound is missed."""
     parser = _parser()
     options = parser.parse_args(arguments)
     if not options.out.parent.is_dir():

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""What can be imperfect about a valve and its instruments, and by how much: drawn by chance."""
+"""Imperfections of a valve and its instruments, with random sizes."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -25,14 +25,14 @@ _QUIET = (2e-4, 8e-4)
 """Noise of an ordinary sensor, share of its range."""
 
 _MOST = 3
-"""Imperfections at once."""
+"""Maximum number of simultaneous imperfections."""
 
 _Random = np.random.Generator
 
 
 @dataclass(frozen=True)
 class Draft:
-    """A valve and its instruments, while imperfections are added."""
+    """A valve and its instruments, to which imperfections are added."""
 
     valve: DrawnValve
     instruments: Instruments
@@ -52,7 +52,7 @@ class Draft:
         return replace(self, valve=valve)
 
     def sensor(self, which: str, **changes: Any) -> "Draft":
-        """Change fields of the sensor of "pressure" or "position"."""
+        """Change fields of the "pressure" or "position" sensor."""
         sensor = replace(getattr(self.instruments, which), **changes)
         return replace(self, instruments=replace(self.instruments, **{which: sensor}))
 
@@ -85,7 +85,7 @@ class Draft:
 
 
 def instruments_of(valve: DrawnValve, random: _Random) -> Instruments:
-    """Draw ordinary instruments: little noise, both signals sampled together at 100 Hz or more."""
+    """Draw ordinary instruments: low noise, both signals sampled together at 100 Hz or more."""
     travel = valve.plant.body.travel
     low, high = valve.sensor
     noise = log_uniform(random, *_QUIET)
@@ -162,7 +162,7 @@ def _curved(draft: Draft, random: _Random) -> Draft:
 
 
 def _bending(law: Law) -> Callable[[Draft, _Random], Draft]:
-    """Let the packing bend before it slides, by up to 0.2 % of the travel."""
+    """Let the packing bend by up to 0.2 % of the travel before it slides."""
     return lambda draft, random: draft.friction(
         law=law, presliding=draft.travel * log_uniform(random, 2e-4, 2e-3)
     )
@@ -213,7 +213,7 @@ IMPERFECTIONS: Mapping[str, Callable[[Draft, np.random.Generator], Draft]] = Map
         "latched": _dead_zone(Law.LATCHED),
     }
 )
-"""Imperfections by name: each draws its own size."""
+"""Imperfections by name; each draws its own size."""
 
 _EXCLUDE = (
     {"noise", "coloured noise", "quantised"},
@@ -222,24 +222,24 @@ _EXCLUDE = (
     {"asymmetric", "along travel", "in record"},
     {"LuGre", "Maxwell", "Karnopp", "latched"},
 )
-"""Of each of these, one at a time."""
+"""Groups of mutually exclusive imperfections."""
 
 
 def drawn_imperfections(
     valve: DrawnValve, random: np.random.Generator
 ) -> tuple[Draft, tuple[str, ...]]:
-    """Add one to three imperfections to a valve with ordinary instruments; return their names."""
+    """Add one to three imperfections to a valve with ordinary instruments, and name them."""
     draft = Draft(valve, instruments_of(valve, random))
     wanted = int(random.integers(1, _MOST + 1))
     names: list[str] = []
     for name in map(str, random.permutation(list(IMPERFECTIONS))):
-        # There is no spring that could be curved, or the packing has a curve of its own already.
+        # Without a spring none can be curved; a packing that slips has its own friction curve.
         is_odd = name == "curved" and not valve.plant.body.spring
         is_odd |= name in ("Karnopp", "latched") and valve.slips
         if is_odd or any(name in group and group & set(names) for group in _EXCLUDE):
             continue
         names = [*names, name][:wanted]
-    # The rate first: others depend on it.
+    # The rate comes first, because others depend on it.
     for name in sorted(names, key=lambda one: one != "low rate"):
         draft = IMPERFECTIONS[name](draft, random)
     return draft, tuple(names)

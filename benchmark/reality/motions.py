@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""How a valve is driven: test signals, moves in closed loop, and loops that hunt."""
+"""Drives of a valve: test signals, moves in closed loop, and hunting loops."""
 
 from dataclasses import dataclass
 from enum import Enum
@@ -20,7 +20,7 @@ from benchmark.reality.valves import DrawnValve, log_uniform
 
 
 class Kind(Enum):
-    """What the valve does in a record."""
+    """Motion of the valve in a record."""
 
     SQUARE = "square"
     RAMP = "ramp"
@@ -36,7 +36,7 @@ class Kind(Enum):
 
 @dataclass(frozen=True, eq=False)
 class Drive:
-    """What `plants.move` takes.
+    """Arguments of `plants.move`.
 
     Attributes
     ----------
@@ -45,9 +45,9 @@ class Drive:
     signal : ndarray of float, shape (n,)
         Command or set point on the grid.
     disturbance : ndarray of float, shape (m,)
-        Noise of what the controller measures.
+        Measurement noise of the controller.
     before, duration : float
-        Time between the first point and the begin of the record, and length of the record, s.
+        Time from the first point to the start of the record, and length of the record, s.
     """
 
     loop: Loop
@@ -61,7 +61,7 @@ _Signal = NDArray[np.float64]
 _Random = np.random.Generator
 
 _CONTROLLED = 2e-4
-"""Noise of what a controller measures, share of the travel."""
+"""Measurement noise of a controller, share of the travel."""
 
 
 def _time(before: float, duration: float) -> _Signal:
@@ -97,7 +97,7 @@ def _closed(
     filling: float = 0.0,
     period: float = 0.0,
 ) -> Drive:
-    """Control the position; with a `process_lag` (s), the flow that follows it."""
+    """Control the position or, with a `process_lag`, s, the flow that follows it."""
     every = round((period or float(random.choice([0.02, 0.05, 0.1]))) / GRID)
     loop = Loop(
         closed=True,
@@ -115,7 +115,7 @@ def _closed(
 
 
 def _held(time: _Signal, moments: list[float], values: list[float]) -> _Signal:
-    """Return steps: each value from its moment on."""
+    """Return steps: each value holds from its moment."""
     return np.array(values)[np.searchsorted(moments, time, side="right") - 1]
 
 
@@ -154,7 +154,7 @@ def _random_levels(
     among: tuple[float, float],
     steps: tuple[float, float],
 ) -> tuple[list[float], list[float]]:
-    """Hold levels for 0.5 to 1.5 `hold`; two in a row differ by these shares of the range."""
+    """Hold levels for 0.5 to 1.5 `hold`; successive levels differ by `steps`, shares of a range."""
     low, high = among
     moments, values = [begin], [float(random.uniform(low, high))]
     while moments[-1] < end:
@@ -185,7 +185,7 @@ def _integral_time(valve: DrawnValve, random: _Random) -> float:
 
 
 def _loop(valve: DrawnValve, random: _Random) -> Drive:
-    """Move by 1 to 5 % of the travel, as a loop in service does."""
+    """Move by 1 to 5 % of the travel, like a loop in service."""
     hold = max(log_uniform(random, 3.0, 8.0) * valve.settling, 3.0)
     duration, before = float(np.clip(15.0 * hold, 60.0, 120.0)), 15.0
     place = random.uniform(0.3, 0.7)
@@ -198,14 +198,14 @@ def _loop(valve: DrawnValve, random: _Random) -> Drive:
 
 
 def _hunting(valve: DrawnValve, random: _Random) -> Drive:
-    """Let a controller of the flow hunt about a set point that hardly changes."""
+    """Let a flow controller hunt around a nearly constant set point."""
     friction = valve.plant.friction
     lag = log_uniform(random, 0.5, 2.0)
     filling = min(valve.filling, lag)
-    # Without slip the loop is stable.
+    # Without slip the loop would be stable.
     slowest = lag + valve.settling - valve.filling + filling
     gain, integral = random.uniform(0.6, 1.6), slowest * log_uniform(random, 0.8, 1.6)
-    # The integral goes through twice F_c while the error is about F_s − F_c.
+    # The integral passes through twice F_c while the error is about F_s − F_c.
     half = integral * 2.0 * friction.coulomb / (friction.static - friction.coulomb) / gain
     duration, before = (
         float(np.clip(20.0 * half, 90.0, 240.0)),
@@ -220,7 +220,7 @@ def _hunting(valve: DrawnValve, random: _Random) -> Drive:
 
 
 def _steps(valve: DrawnValve, random: _Random) -> Drive:
-    """Step by 1, 2, 5 and 10 % up and down, as ISA-75.25 does."""
+    """Step by 1, 2, 5 and 10 % up and down, as in ISA-75.25."""
     place = float(random.uniform(0.35, 0.55))
     hold = float(np.clip(log_uniform(random, 3.0, 8.0) * valve.settling, 2.0, 12.0))
     values = [place]
@@ -235,7 +235,7 @@ def _steps(valve: DrawnValve, random: _Random) -> Drive:
 
 
 def _command(valve: DrawnValve, place: float, way: float) -> float:
-    """Return the command at which a stem slides slowly through a place, up (1) or down (−1)."""
+    """Return the command at which a stem slides slowly past a place, up (1) or down (−1)."""
     body, friction = valve.plant.body, valve.plant.friction
     force = body.preload + body.spring * body.travel * place + way * friction.coulomb
     pressure = body.pressure_reference + force / body.area
@@ -243,7 +243,7 @@ def _command(valve: DrawnValve, place: float, way: float) -> float:
 
 
 def _partial(valve: DrawnValve, random: _Random, start: float, away: float, back: float) -> Drive:
-    """Go from a command to another one and back, once, by ramps; rest before and after."""
+    """Ramp once from a command to another and back, with rests before and after."""
     moving = max(log_uniform(random, 3.0, 15.0), 2.0 * valve.settling)
     rests = [log_uniform(random, 2.0, 15.0) for _ in range(3)]
     moments = [0.0, rests[0], rests[0] + moving, rests[0] + moving + 0.3 * rests[1]]
@@ -271,13 +271,13 @@ def _from_middle(valve: DrawnValve, random: _Random) -> Drive:
 
 
 _FAST = 0.002
-"""Time between two actions of a controller that stands for a machine, s."""
+"""Period of the controller that represents a machine, s."""
 
 
 def _cylinder(valve: DrawnValve, random: _Random) -> Drive:
-    """Move a cylinder to and fro behind a set point that its controller follows closely."""
+    """Move a cylinder to and fro with a controller that follows its set point closely."""
     body, friction = valve.plant.body, valve.plant.friction
-    # Pressure and controller lag; Routh's criterion for them, mass and damping.
+    # Pressure and controller lag; Routh's criterion with mass and damping.
     late = valve.filling + _FAST
     stiffest = 0.2 * friction.viscous * (1.0 / late + friction.viscous / body.mass)
     stiffest = min(stiffest, 0.2 * friction.viscous / _FAST)
@@ -290,7 +290,7 @@ def _cylinder(valve: DrawnValve, random: _Random) -> Drive:
     wave = np.sin(2.0 * np.pi * phase)
     if random.random() < 0.5:
         wave = 4.0 * np.abs(phase % 1.0 - 0.5) - 1.0
-    # The command without an error is that of no force.
+    # At zero error the command gives zero force.
     wave[0] = 0.0
     signal = 0.5 + swing * wave
     return _closed(valve, random, signal, before, duration, gain, 1e9, period=_FAST)

@@ -7,9 +7,9 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The package behind the few functions that the benchmark calls.
+"""Functions through which the benchmark calls the package.
 
-The only file here that knows the package.
+No other file here imports the package.
 """
 
 import math
@@ -47,12 +47,12 @@ _WINDOW = 1e4
 
 _PLAIN = ("mass", "coulomb_friction", "viscous_friction", "spring_constant", "spring_preload")
 _STEPS = 25
-"""Coordinates and most steps of a fit that begins at the truth; few steps are taken."""
+"""Maximum number of steps of a fit that starts at the truth; it needs few."""
 
 
 @dataclass(frozen=True)
 class Number:
-    """A number of an answer: value and half width (SI unit, nan where there is none), verdict."""
+    """A number in an answer: value and half width (SI unit, nan if absent), and verdict."""
 
     value: float
     half_width: float
@@ -61,10 +61,10 @@ class Number:
 
 @dataclass(frozen=True)
 class Answer:
-    """What the package says of a record: numbers, or why there are none.
+    """Answer of the package for a record: numbers, or the reason of a refusal.
 
-    `native` is its own result, `fits` are the fits behind it, and `held` are the numbers of a stem
-    that a refused record could not move.
+    `native` is the package's own result, and `fits` are the fits behind it. `held` has the numbers
+    of a stem that did not move in a refused record.
     """
 
     numbers: Mapping[str, Number] = field(default_factory=dict)
@@ -76,10 +76,10 @@ class Answer:
 
 
 class Ends(NamedTuple):
-    """Where the search ended, beside a fit that was begun at the truth.
+    """Result of the search, compared with a fit that starts at the truth.
 
-    `found` and `begun` are the sums of squares of both, in variances of the residual of the second;
-    `coulomb` is F_c of the first, N, `half_widths` are those of the second.
+    `found` and `begun` are the sums of squares of search and fit, in variances of the residual of
+    the fit. `coulomb` is F_c of the search, N; `half_widths` are those of the fit.
     """
 
     found: float
@@ -99,12 +99,12 @@ def _valve(nominal: Nominal) -> Valve:
 
 
 def _settings(has_spring: bool) -> IdentificationSettings:
-    """Return the defaults; that there is no spring is said, as a user has to."""
+    """Return default settings; like a user, state that there is no spring."""
     return IdentificationSettings(fixed={} if has_spring else {"spring_constant": 0.0})
 
 
 def _recording(record: Record) -> Recording:
-    """Let both signals arrive in the order of their stamps; of a repeated one only the first."""
+    """Let both signals arrive in order of stamps; keep the first sample of a repeated stamp."""
     kinds, stamps, values = [], [], []
     for kind, signal in ((Kind.PRESSURE, record.pressure), (Kind.POSITION, record.position)):
         new = np.diff(signal.stamps, prepend=signal.stamps[:1] - 1) > 0
@@ -122,7 +122,7 @@ def _recording(record: Record) -> Recording:
 
 @contextmanager
 def _seen_fits() -> Iterator[list[PosteriorFit]]:
-    """Collect the fits that an identification ends with; a second search would double the time."""
+    """Collect the final fits of an identification; a second search would double the time."""
     seen: list[PosteriorFit] = []
 
     def collecting(*arguments: Any) -> list[PosteriorFit]:
@@ -149,7 +149,7 @@ def _answer(recording: Recording, valve: Valve, has_spring: bool, method: str) -
 
 
 def identify(record: Record, method: str = DEFAULT_METHOD) -> Answer:
-    """Identify a record as a node does, through the buffer, with the stamps as they are."""
+    """Identify a record like a node, through the buffer and with unchanged stamps."""
     try:
         recording = _recording(record)
     except RefusalError as refusal:
@@ -159,7 +159,7 @@ def identify(record: Record, method: str = DEFAULT_METHOD) -> Answer:
 
 
 def identify_file(path: Path, method: str = DEFAULT_METHOD) -> Answer:
-    """Identify a file of a machine without a spring that a force drives."""
+    """Identify a file of a force-driven machine without a spring."""
     valve = Valve()
     try:
         recording = read_recording(path, valve)
@@ -180,11 +180,10 @@ def is_baseline(answer: Answer) -> bool:
 
 
 def alarms(answer: Answer, healthy: Answer) -> dict[str, str]:
-    """Compare with the result of the healthy valve, as the monitor does.
+    """Compare with the result of the healthy valve, like the monitor.
 
-    The keys are "high" and "low" for its friction, "perhaps" where that is not sure, and "other"
-    for all else that is more than OK or another status signal than good; the values are the
-    sentences.
+    The keys are "high" and "low" for friction, "perhaps" for uncertain friction, and "other" for
+    any other finding that is not OK or not good. The values are the sentences.
     """
     baseline = Baseline.of(healthy.native) if healthy.native and is_baseline(healthy) else None
     if answer.native is None:
@@ -209,7 +208,7 @@ def _words(one: Any) -> str:
 
 
 def ends(record: Record, answer: Answer) -> Ends | None:
-    """Compare the search with a fit begun at the truth; None where nothing was simulated."""
+    """Compare the search with a fit that starts at the truth; return None without a simulation."""
     if not answer.fits:
         return None
     found, truth = answer.fits[0], record.truth

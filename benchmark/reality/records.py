@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Records: a drawn valve under a drawn drive, what the sensors wrote, and what is true."""
+"""Records of random valves under random drives, with the measured signals and the truth."""
 
 import json
 import math
@@ -30,20 +30,21 @@ from benchmark.reality.valves import drawn_cylinder, drawn_valve
 
 _TRIES = 100
 _LEAST_MOVE = 0.008
-"""A record must hold moves both ways of so much of the travel; hunting, so many reversals of
-`_LEAST_SWING`. Else valve and drive are drawn again: no method finds friction where nothing
-slides."""
+"""Smallest move, share of the travel, that a record must contain in both directions. Hunting needs
+`_REVERSALS` reversals of `_LEAST_SWING` instead. Otherwise valve and drive are drawn again: no
+method finds friction where nothing slides."""
 
 _REVERSALS = 6
 _LEAST_SWING = 0.004
 
 
 class Case(NamedTuple):
-    """A record to be made: of valve `number` with this `motion` in the run of an `entropy`.
+    """A record to make: valve `number` with this `motion` in the run of an `entropy`.
 
-    `again` chooses another record of that valve, with another signal and other noise, and `change`
-    is its friction over that of the drawn valve. The packing `slips` or not; without a word that
-    is drawn too. By `reserve` the friction may grow before the actuator cannot stroke the valve.
+    `again` selects another record of the valve, with another signal and other noise. `change` is
+    its friction over that of the original valve. The packing `slips` or not; None draws that too.
+    `reserve` is the factor by which friction may grow while the actuator can still stroke the
+    valve.
     """
 
     entropy: int
@@ -64,7 +65,7 @@ class Case(NamedTuple):
 
 @dataclass(frozen=True)
 class Nominal:
-    """What the user of the identification knows of the valve.
+    """The user's knowledge of the valve.
 
     Attributes
     ----------
@@ -86,33 +87,33 @@ class Nominal:
 
 @dataclass(frozen=True, eq=False)
 class Record:
-    """A record as it was written, and the truth about it.
+    """A record as written by the sensors, with the truth.
 
     Attributes
     ----------
     nominal : Nominal
-        The valve as its user describes it.
+        The valve as described by the user.
     pressure, position : Signal
-        Stamps (ns) and values (Pa, m) of each.
+        Stamps (ns) and values (Pa, m).
     truth : mapping of str to TrueValue
-        What is true.
+        True numbers.
     name : str
-        Of the case.
+        Name of the case.
     kind : str
-        Of the valve.
+        Kind of the valve.
     slips : bool
-        Whether its packing slips.
+        Whether the packing slips.
     share : float
         F_c over the force of the spring.
     rate : float
-        Samples a second.
+        Samples per second.
     imperfections : tuple of str
-        What is imperfect.
+        Names of the imperfections.
     start : float
-        True position at the begin of the record, m.
+        True position at the start of the record, m.
     late : mapping of str to float
-        Clock offset of the stem ("delay"), lag of its sensor ("stem_lag"), and volume less lag of
-        the pressure sensor ("force_lag"), s.
+        Clock offset of the stem ("delay"), lag of its sensor ("stem_lag"), and lag of the volume
+        minus that of the pressure sensor ("force_lag"), s.
     """
 
     nominal: Nominal
@@ -130,7 +131,7 @@ class Record:
 
 
 def _draft(case: Case, attempt: int) -> tuple[Draft, tuple[str, ...]]:
-    """Draw valve, instruments and imperfections; the same for all records of a valve."""
+    """Draw valve, instruments and imperfections, the same for all records of a valve."""
     place = list(Kind).index(case.motion)
     random = np.random.default_rng([case.entropy, place, case.number, attempt])
     slips = bool(random.random() < 0.5) if case.slips is None else case.slips
@@ -145,13 +146,13 @@ def _draft(case: Case, attempt: int) -> tuple[Draft, tuple[str, ...]]:
 
 def _seed(case: Case, attempt: int) -> list[int]:
     place = list(Kind).index(case.motion)
-    # A changed friction is another day: signal and noise are drawn anew.
+    # Changed friction means another day, with a new signal and new noise.
     return [case.entropy, place, case.number, attempt, 1, case.again]
 
 
 @lru_cache(maxsize=1)
 def _moved(case: Case, attempt: int) -> tuple[Draft, tuple[str, ...], Drive, Motion]:
-    """Draw and move a valve; kept, as the attempt that succeeds becomes the record."""
+    """Draw and move a valve; cached, since the successful attempt becomes the record."""
     draft, names = _draft(case, attempt)
     drive = drawn_drive(case.motion, draft.valve, np.random.default_rng(_seed(case, attempt)))
     plant = draft.valve.plant
@@ -161,7 +162,7 @@ def _moved(case: Case, attempt: int) -> tuple[Draft, tuple[str, ...], Drive, Mot
 
 
 def _swings(position: NDArray[np.float64], least: float) -> int:
-    """Count the moves of at least so much, m, between reversals."""
+    """Count the moves of at least `least`, m, between reversals."""
     count, way, low, high = 0, 0, position[0], position[0]
     for now in position[:: round(0.02 / GRID)].tolist():
         low, high = min(low, now), max(high, now)
@@ -185,7 +186,7 @@ def _is_excited(case: Case, draft: Draft, motion: Motion) -> bool:
 
 
 def _jump(draft: Draft) -> float:
-    """Return by how much of its travel a stem that breaks away moves at least."""
+    """Return the smallest jump of the stem at breakaway, share of the travel."""
     body, friction = draft.valve.plant.body, draft.valve.plant.friction
     return (friction.static - friction.coulomb) / (body.spring * body.travel)
 
@@ -203,7 +204,7 @@ def _attempt(case: Case) -> int:
 
 
 def make_record(case: Case) -> Record:
-    """Make a record; the same each time, to the last bit."""
+    """Make a record, reproducible to the last bit."""
     attempt = _attempt(case._replace(again=0, change=1.0))
     draft, names, drive, motion = _moved(case, attempt)
     valve, instruments = draft.valve, draft.instruments
@@ -257,7 +258,7 @@ def save(record: Record, path: Path) -> None:
 
 
 def load(folder: Path) -> Iterator[Record]:
-    """Read what `save` wrote, in the order of the names."""
+    """Read the records that `save` wrote, in order of their names."""
     for path in sorted(folder.glob("*.npz")):
         with np.load(path) as file:
             parts: dict[str, Any] = json.loads(str(file["about"]))

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The rows as tables, and the bounds."""
+"""The rows as tables, and the requirements."""
 
 import math
 import re
@@ -20,7 +20,7 @@ from benchmark.harness.rows import Bound
 from benchmark.reality.trial import CHANGES, SLIDING, RealRow, Row
 
 _WIDEST_ERROR, _LEAST_ERROR = 3.0, 0.02
-"""An identified number is wrong if it is off by more half widths, and by more than this share."""
+"""An identified number is wrong if its error exceeds both this many half widths and this share."""
 
 _FLOORS = {
     "clock_offset": 1e-3,
@@ -29,24 +29,25 @@ _FLOORS = {
     "limit_velocity": 1e-4,
     "stribeck_velocity": 1e-4,
 }
-"""Errors, SI unit, that are not wrong in numbers that may be zero."""
+"""Tolerated errors, SI unit, of numbers that may be zero."""
 
 _USEFUL, _RIGHT = 0.10, 0.05
-"""Largest error and half width of a useful sliding friction; largest error of least squares."""
+"""Largest error and half width of useful sliding friction, and largest error of least squares."""
 
 _SAME_MODE, _SAME_FRICTION, _LEAST_WIDTH = 10.0, 2.0, 0.02
-"""Rise of the sum of squares, in variances of the residual, and distance of F_c from the truth, in
-half widths of the fit begun there, that noise explains; least half width, share of the truth."""
+"""Increase of the sum of squares, in variances of the residual, and distance of F_c from the truth,
+in half widths of the fit that starts there, that noise can explain; and the smallest such half
+width, share of the truth."""
 
 _FAST = 99.0
 _SLOWEST = 2.0
-"""Samples a second from which a record is one of 100 Hz and better; longest time, s."""
+"""Samples per second above which a record belongs to 100 Hz and better; and the time limit, s."""
 
 _DECLARED = {1.5: 0.85, 2.0: 0.98, 0.45: 0.85}
-"""Share of the plants on which a friction that has changed by this factor must be declared."""
+"""Required share of plants on which a change of friction by this factor is declared."""
 
 _CYLINDERS = 50 / 59
-"""Share of the real cylinders whose sliding friction must be right."""
+"""Required share of real cylinders with correct sliding friction."""
 
 _VERDICTS = ("identified", "weak")
 
@@ -54,7 +55,7 @@ _Rows = Sequence[Row]
 
 
 class Judged(NamedTuple):
-    """A number beside the truth, SI unit; the error is the distance from all that can be true."""
+    """A number and its truth, SI unit; the error is the distance from all acceptable values."""
 
     row: Row
     name: str
@@ -70,14 +71,14 @@ class Judged(NamedTuple):
 
     @property
     def wrong(self) -> bool:
-        """Whether it is confidently wrong."""
+        """Whether the number is identified but wrong."""
         least = max(_LEAST_ERROR * abs(self.truth), _FLOORS.get(self.name, 0.0))
         far = self.error > max(_WIDEST_ERROR * self.half_width, least)
         return self.verdict == "identified" and far
 
 
 def judged(rows: Iterable[Row]) -> list[Judged]:
-    """Return all numbers with an interval beside the truth."""
+    """Return all numbers with an interval, together with the truth."""
     return [
         Judged(row, name, one.verdict, truth.value, truth.error(one.value), one.half_width)
         for row in rows
@@ -97,7 +98,7 @@ def _near(row: Row, name: str, share: float, narrow: float = math.inf) -> bool:
 
 
 def is_useful(row: Row) -> bool:
-    """Return whether the sliding friction is right and known to 10 %."""
+    """Return whether the sliding friction is correct and known to 10 %."""
     return _near(row, SLIDING, _USEFUL, _USEFUL)
 
 
@@ -108,7 +109,7 @@ def is_right(row: Row) -> bool:
 
 
 def in_mode(row: Row) -> bool:
-    """Return whether the search ended where a fit that was begun at the truth does."""
+    """Return whether the search ended in the same mode as a fit that starts at the truth."""
     if not _is_fitted(row):
         return False
     truth = row.truth["coulomb_friction"]
@@ -131,7 +132,7 @@ def _is_fast(row: Row) -> bool:
 
 
 def _declaration(row: Row) -> str:
-    """Return the alarm on the friction on the side of its change; empty without one."""
+    """Return the friction alarm on the side of the change; empty without an alarm."""
     return row.alarms.get("high" if row.change > 1.0 else "low", "")
 
 
@@ -140,7 +141,7 @@ def _is_declared(row: Row) -> bool:
 
 
 def _ratios(rows: _Rows, name: str = "") -> list[float]:
-    """Return the half widths over those of the fit begun at the truth."""
+    """Return the half widths over those of the fit that starts at the truth."""
     return [
         one.half_width / row.widths[other]
         for row in rows
@@ -265,7 +266,7 @@ def _alarms(rows: _Rows) -> Sequence[object]:
 
 
 def _declared(rows: _Rows) -> str:
-    """Say at which level a change is declared, and how often it is not sure."""
+    """Return how often a change is declared, at which level, and how often it is uncertain."""
     errors = _count(lambda row: _declaration(row).startswith("ERROR"), rows)
     unsure = _count(lambda row: not _is_declared(row) and "perhaps" in row.alarms, rows)
     return f"{_of(_is_declared, rows)}, {errors} as ERROR; {unsure} perhaps"
@@ -306,7 +307,7 @@ def _bounds_of_alarms(rows: _Rows) -> Iterator[Bound]:
 
 
 def bounds(rows: _Rows, real: Sequence[RealRow] = ()) -> Iterator[Bound]:
-    """Yield the requirements of all that was run, and what was reached."""
+    """Yield the requirements of all parts that were run, with the figures reached."""
     numbers = judged(rows)
     yield _none("identified and wrong", sum(one.wrong for one in numbers))
     for verdict in _VERDICTS:
@@ -342,7 +343,7 @@ def bounds(rows: _Rows, real: Sequence[RealRow] = ()) -> Iterator[Bound]:
 
 
 def _missed(rows: _Rows) -> Iterator[str]:
-    """Yield what violates a bound, one line each, and the refusals with their number."""
+    """Yield violations of the requirements, one line each, and refusals with their counts."""
     for one in judged(rows):
         if one.wrong:
             error = one.row.numbers[one.name].value / one.truth - 1.0
@@ -360,7 +361,7 @@ def _missed(rows: _Rows) -> Iterator[str]:
 
 
 def report(rows: _Rows, real: Sequence[RealRow] = ()) -> Iterator[str]:
-    """Yield the lines of the report, Markdown."""
+    """Yield the lines of the report in Markdown."""
     whole = [row for row in rows if row.part != "alarms"]
     if plain := [row for row in rows if row.part == "plain"]:
         for title, classes in _CLASSES.items():

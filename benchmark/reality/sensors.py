@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""What the sensors and their messages make of the true signals, and what time they bear."""
+"""Sensors, their messages and their time stamps."""
 
 import math
 from dataclasses import dataclass, field
@@ -29,17 +29,17 @@ class Stamping:
     rate : float
         Samples per second.
     jitter : float
-        Largest shift of an instant from its place, share of the period; the stamp is right.
+        Largest shift of a sampling instant, share of the period; the stamp is correct.
     stamp_error : float
-        Largest error of a stamp, s, to either side, each for itself.
+        Largest error of a stamp in either direction, s, independent per sample.
     offset : float
         Time by which the stamps are late, s.
     drops : float
-        Share of the messages that are lost, each for itself.
+        Share of lost messages, independent per message.
     bursts, burst : int and float
-        Number and length (s) of the pauses in which all messages are lost.
+        Number and length (s) of pauses in which all messages are lost.
     resolution : float
-        Step to which stamps are cut, s; 0: a nanosecond.
+        Resolution to which stamps are truncated, s; 0 for a nanosecond.
     """
 
     rate: float = 1000.0
@@ -60,9 +60,9 @@ class Times(NamedTuple):
     period : float
         Nominal time between two samples, s.
     taken : ndarray of float, shape (n,)
-        When the samples were taken, s from the start of the record.
+        Sampling times, s from the start of the record.
     written : ndarray of float, shape (n,)
-        What the clock said then, s.
+        Readings of the clock at these times, s.
     lost : ndarray of bool, shape (n,)
         Whether the message is lost.
     """
@@ -92,7 +92,7 @@ def sampling_times(stamping: Stamping, duration: float, random: np.random.Genera
 
 
 def stamped(stamping: Stamping, written: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Return the stamps, ns, with which a clock writes its times (s)."""
+    """Return the stamps, ns, for the times of a clock, s."""
     stamps: NDArray[np.int64] = np.rint((written + stamping.offset) * 1e9).astype(np.int64)
     if stamping.resolution > 0.0:
         unit = round(stamping.resolution * 1e9)
@@ -101,12 +101,12 @@ def stamped(stamping: Stamping, written: NDArray[np.float64]) -> NDArray[np.int6
 
 
 class Signal(NamedTuple):
-    """One topic, or one column with its times.
+    """A topic, or a column with its times.
 
     Attributes
     ----------
     stamps : ndarray of int64, shape (n,)
-        Times as they were written, ns, not decreasing.
+        Written times, ns, non-decreasing.
     values : ndarray of float, shape (n,)
         Pa or m.
     """
@@ -117,26 +117,26 @@ class Signal(NamedTuple):
 
 @dataclass(frozen=True)
 class Sensor:
-    """How one quantity is measured.
+    """The sensor of one quantity.
 
     Attributes
     ----------
     noise : float
         Standard deviation, SI unit.
     colour : float
-        Time constant of the noise's memory, s; 0: white.
+        Correlation time of the noise, s; 0 for white noise.
     low, high : float
-        Range, SI unit, of the converter and of the dead band.
+        Range, SI unit, for the converter and the dead band.
     bits : int
-        Resolution of the converter; 0: exact.
+        Resolution of the converter; 0 for exact values.
     lag : float
         First-order lag, s.
     drift : float
-        Change of the zero, SI unit/s.
+        Drift of the zero, SI unit/s.
     hold : float
-        Time for which a value is repeated, s; 0: each is new.
+        Time for which a value is repeated, s; 0 for a new value in each sample.
     dead_band : float
-        Share of the range by which the value must change for a message; 0: all are sent.
+        Change of the value that triggers a message, share of the range; 0 to send all.
     silence : float
         Longest time without a message under a dead band, s.
     """
@@ -162,9 +162,9 @@ class Instruments:
     pressure, position : Sensor
         The sensors.
     pressure_stamping, position_stamping : Stamping
-        When they sample and what time they write.
+        Their clocks.
     together : bool
-        Whether both are sampled at the same instants and lost together, as rows of a table.
+        Whether both are sampled at the same instants and lost together, like rows of a table.
     """
 
     pressure: Sensor = field(default_factory=lambda: Sensor(100.0, 0.0, 250e3))
@@ -184,11 +184,11 @@ def measured(
     motion : Motion
         The true signals.
     instruments : Instruments
-        What measures them.
+        Sensors and clocks.
     duration : float
         Length of the record, s.
     seed : int
-        Of the noise, and of all that happens to the messages.
+        Seed of the noise and of all effects on the messages.
 
     Returns
     -------
@@ -217,7 +217,7 @@ def _signal(
 
 
 def _lagged(values: NDArray[np.float64], lag: float) -> NDArray[np.float64]:
-    """Return the response of a first-order lag to a signal that runs linearly between points."""
+    """Return the response of a first-order lag to a signal that is linear between points."""
     decay = np.exp(-GRID / lag)
     memory = (1.0 - decay) * lag / GRID
     ahead, behind = 1.0 - memory, memory - decay
@@ -243,7 +243,7 @@ def _values(
     times: Times,
     random: np.random.Generator,
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Return the value of each sample, and whether it is sent."""
+    """Return the values of the samples, and whether each is sent."""
     seen = _lagged(exact, sensor.lag) if sensor.lag > 0.0 else exact
     values: NDArray[np.float64] = np.interp(times.taken, motion.time, seen)
     values = values + sensor.drift * times.taken + _noise(sensor, times, random)
@@ -264,7 +264,7 @@ def _values(
 def _sent_by_exception(
     values: NDArray[np.float64], times: NDArray[np.float64], band: float, silence: float
 ) -> NDArray[np.bool_]:
-    """Tell which values differ from the last one sent, or come after a long silence."""
+    """Return which values differ from the last value sent, or follow a long silence."""
     sent: NDArray[np.bool_] = np.zeros(values.size, dtype=np.bool_)
     value, moment = np.inf, -np.inf
     for sample, (now, time) in enumerate(zip(values.tolist(), times.tolist(), strict=True)):

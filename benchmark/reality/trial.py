@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""One valve tried: its records made, identified within a time limit, and compared."""
+"""Trial of one valve: make its records, identify them within a time limit, and compare."""
 
 import json
 import math
@@ -30,17 +30,18 @@ from benchmark.reality.records import Case, Record, make_record, save
 from benchmark.reality.truth import TrueValue
 
 EMPS = {"coulomb_friction": 20.3935, "viscous_friction": 203.5034}
-"""IDIM-LS values of the data set's authors: N, and N·s/m."""
+"""IDIM-LS values by the authors of the data set: N, and N·s/m."""
 
 _NEAR, _NARROW = 0.10, 0.10
 _NEAR_EMPS = 0.03
-"""Largest error and half width of a cylinder's sliding friction; largest error of EMPS; shares."""
+"""Largest error and half width of a cylinder's sliding friction, and largest error for EMPS, as
+shares."""
 
 
 class RealRow(NamedTuple):
-    """A number of a real machine beside what others say of it, SI unit.
+    """A number of a real machine and its published value, SI unit.
 
-    `words` are verdict or refusal; `met` tells whether it is as near and narrow as it must be.
+    `words` is the verdict or the refusal. `met` is whether error and half width are small enough.
     """
 
     machine: str
@@ -63,9 +64,10 @@ def _real_row(
 
 
 def real_rows(folder: Path) -> Iterator[RealRow]:
-    """Identify what the folders ``cylinders`` and ``emps`` hold; one that is absent is left out.
+    """Identify the records in the folders ``cylinders`` and ``emps``, if present.
 
-    Beside each cylinder ``half_loops.json`` holds half the distance, N, of the forces both ways.
+    ``half_loops.json`` gives, for each cylinder, half the difference, N, between the forces in both
+    directions.
     """
     known = folder / "cylinders" / "half_loops.json"
     if known.is_file():
@@ -82,13 +84,13 @@ def real_rows(folder: Path) -> Iterator[RealRow]:
 
 _WINDOW = 0.15
 _SURELY = 0.2
-"""Length of the filter, s, and share of the top speed above which a sample surely slides."""
+"""Length of the filter, s, and share of the top speed above which the stem surely slides."""
 
 
 def sliding_friction(record: Record) -> float:
-    """Return the sliding friction, N, at the distance-weighted speed; nan where none slides.
+    """Return the sliding friction, N, at the distance-weighted speed; nan if nothing slides.
 
-    The actuator force is regressed on sgn v, v, x and 1. No lag, no interval, no doubt.
+    Regress the actuator force on sgn v, v, x and 1, without lags, intervals or checks.
     """
     stamps, position = record.position.stamps / 1e9, record.position.values
     pressure_stamps = record.pressure.stamps / 1e9
@@ -115,21 +117,21 @@ def sliding_friction(record: Record) -> float:
 SLIDING = "sliding_friction"
 
 CHANGES = (1.0, 1.5, 2.0, 0.45)
-"""Friction over that of the baseline."""
+"""Friction over the friction of the baseline."""
 
 _T = TypeVar("_T")
 
 
 @dataclass(frozen=True)
 class Row:
-    """What became of one record.
+    """The outcome of one record.
 
-    `part` is "plain", "stickslip" or "alarms"; `name` to `change` are the record's (`Record`,
-    `Case`), its length in s. Truth and numbers are by the names of `truth.NAMES`; `refusal` says
-    why there is no result, `failure` why there is no answer at all. `least_squares` is the sliding
-    friction, N; `seconds` the processor time. `has_baseline` tells whether the healthy valve gave
-    one, `alarms` are sentences by their side (`package.alarms`). `found` to `widths` are those of
-    `package.Ends`.
+    `part` is "plain", "stickslip" or "alarms". `name` to `change` describe the record (`Record`,
+    `Case`), with its length in s. `truth` and `numbers` have the names of `truth.NAMES`. `refusal`
+    is why there is no result, and `failure` why there is no answer at all. `least_squares` is the
+    sliding friction, N, and `seconds` the processor time. `has_baseline` is whether the healthy
+    valve gave a baseline, and `alarms` are sentences by side (`package.alarms`). `found` to
+    `widths` come from `package.Ends`.
     """
 
     part: str
@@ -157,7 +159,7 @@ class Row:
     widths: Mapping[str, float] = field(default_factory=dict)
 
     def as_line(self) -> str:
-        """Write it as one line of JSON."""
+        """Return the row as one line of JSON."""
         return json.dumps(asdict(self), ensure_ascii=False, default=np.generic.item)
 
 
@@ -175,9 +177,9 @@ def rows_of(path: Path) -> list[Row]:
 
 
 class Task(NamedTuple):
-    """All records of one valve: the `case` is the first.
+    """All records of one valve, of which `case` is the first.
 
-    An identification may take `limit` seconds of the processor; records are kept in `folder`.
+    `limit` is the processor time per identification, s. `folder` is where to save the records.
     """
 
     part: str
@@ -188,7 +190,7 @@ class Task(NamedTuple):
 
 @contextmanager
 def _limited(seconds: float) -> Iterator[None]:
-    """Raise TimeoutError in what takes more processor time; compiled code notices at its return."""
+    """Raise TimeoutError when the processor time is used up; in compiled code, on its return."""
 
     def stop(*_: object) -> None:
         raise TimeoutError(f"more than {seconds:g} s of the processor")
@@ -203,7 +205,7 @@ def _limited(seconds: float) -> Iterator[None]:
 
 
 def _within(limit: float, job: Callable[[], _T]) -> tuple[_T | None, str, float]:
-    """Do a job; return its result or why there is none, and its processor time, s."""
+    """Run a job; return its result or the reason of its failure, and its processor time, s."""
     begin = time.process_time()
     try:
         with _limited(limit):
@@ -239,7 +241,7 @@ def _row(task: Task, case: Case, record: Record) -> tuple[Row, Answer]:
 
 
 def _with_ends(task: Task, row: Row, record: Record, answer: Answer) -> Row:
-    """Add how the search compares with a fit begun at the truth."""
+    """Add the comparison of the search with a fit that starts at the truth."""
     ends, failure, _ = _within(task.limit, lambda: package.ends(record, answer))
     if ends is None:
         return replace(row, failure=row.failure or failure)
@@ -258,7 +260,7 @@ _warm = False
 
 
 def _warm_up() -> None:
-    """Let the first record pay for what is compiled or read once."""
+    """Compile and load once, before the first record."""
     global _warm  # noqa: PLW0603  once a process
     if not _warm:
         record = make_record(Case(0, Kind.LEVELS, 0, slips=True))
@@ -267,7 +269,7 @@ def _warm_up() -> None:
 
 
 def tried(task: Task) -> list[Row]:
-    """Try all records of one valve."""
+    """Run all records of one valve."""
     _warm_up()
     case = task.case
     try:

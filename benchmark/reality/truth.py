@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""What is true of a record: numbers that an identification is compared with."""
+"""The truth about a record: numbers to compare an identification with."""
 
 import math
 from collections.abc import Iterable
@@ -36,32 +36,31 @@ NAMES = (
 )
 """Numbers of a truth, SI units.
 
-``limit_velocity`` is DV of a Karnopp plant, 0 for the others; ``sliding_friction`` is ∫|F·dx|/∫|dx|
-of the record; ``stribeck_velocity`` is nan where F_s is F_c, and so is ``spring_constant`` where
-there is no spring; ``coulomb_asymmetry`` is the share by which the friction is larger upward;
-``clock_offset`` is the time by which the stem is seen late, s, slow sensors and a volume before it
-included. Spring and preload are slope and intercept of all that acts along the travel, as the
-nominal area sees it."""
+``limit_velocity`` is DV of a Karnopp plant, 0 for others. ``sliding_friction`` is ∫|F·dx|/∫|dx| of
+the record. ``stribeck_velocity`` is nan if F_s equals F_c, and ``spring_constant`` is nan without a
+spring. ``coulomb_asymmetry`` is the relative excess of friction upward. ``clock_offset`` is the
+apparent delay of the stem, s, including slow sensors and the actuator volume. Spring and preload
+are slope and intercept of all forces along the travel, referred to the nominal area."""
 
 
 @dataclass(frozen=True)
 class TrueValue:
-    """A number, and how far its definition leaves it open.
+    """A number, and the ambiguity of its definition.
 
     Attributes
     ----------
     value : float
         The number, SI unit.
     spread : float
-        Largest distance of another sensible definition: a friction that changes along the
-        travel has one mean by distance and another by time.
+        Largest distance to another sensible definition: friction that changes along the travel has
+        different means over distance and over time.
     """
 
     value: float
     spread: float = 0.0
 
     def error(self, estimate: float) -> float:
-        """Return how far an estimate is from all definitions, SI unit, ≥ 0."""
+        """Return the distance of an estimate from all definitions, SI unit, ≥ 0."""
         return max(abs(estimate - self.value) - self.spread, 0.0)
 
 
@@ -75,7 +74,7 @@ def _factor(trend: Trend, place: float) -> float:
 
 
 def _load(body: Body, position: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return spring and medium, N, as the nominal area sees them."""
+    """Return the forces of spring and medium, N, referred to the nominal area."""
     place = position / body.travel
     spring = body.spring * position * (1.0 + 0.5 * body.spring_curve * (place - 1.0))
     flow = body.flow_force * np.maximum(place, 0.0) ** body.flow_exponent
@@ -87,7 +86,7 @@ def _load(body: Body, position: NDArray[np.float64]) -> NDArray[np.float64]:
 def _springs(
     body: Body, position: NDArray[np.float64], drifts: Iterable[float]
 ) -> tuple[TrueValue, TrueValue]:
-    """Return k and F_0: over the places that were visited, by time, by the ends, and nominal."""
+    """Return k and F_0 over the range visited, by time, by the ends, and nominal."""
     low, high = float(position.min()), float(position.max())
     places = np.linspace(low, high, 200, dtype=np.float64)
     fits = [np.polyfit(where, _load(body, where), 1) for where in (places, position[::100])]
@@ -103,7 +102,7 @@ def _springs(
 
 
 def _frictions(plant: Plant, motion: Motion, middle: float) -> tuple[TrueValue, TrueValue]:
-    """Return F_c and F_s: by distance, by time, in the middle, and as the nominal area sees it."""
+    """Return F_c and F_s by distance, by time, in the middle, and for the nominal area."""
     body, friction = plant.body, plant.friction
     place = middle / body.travel
     area = 1.0 + body.area_change * (place - 0.5)
@@ -118,7 +117,7 @@ def _frictions(plant: Plant, motion: Motion, middle: float) -> tuple[TrueValue, 
 
 
 def _sliding(motion: Motion, recorded: NDArray[np.bool_]) -> TrueValue:
-    """Return the work of friction a distance; bending that springs back is open to definition."""
+    """Return the friction work per distance, with and without elastic bending."""
     position, force = motion.position[recorded], motion.friction[recorded]
     lost = float(np.sum(0.5 * (force[1:] + force[:-1]) * np.diff(position)))
     if motion.distance == 0.0:
@@ -127,7 +126,7 @@ def _sliding(motion: Motion, recorded: NDArray[np.bool_]) -> TrueValue:
 
 
 def _offset(plant: Plant, instruments: Instruments) -> TrueValue:
-    """Return the clock offset: with all that looks like one, and alone."""
+    """Return the clock offset, with and without lags that have the same effect."""
     stem, pressure = instruments.position, instruments.pressure
     clocks = instruments.position_stamping.offset - instruments.pressure_stamping.offset
     lags = stem.lag - pressure.lag + plant.body.volume_lag
@@ -145,8 +144,8 @@ def truth_of(
 ) -> dict[str, TrueValue]:
     """Return the truth about a record of `duration` seconds; see `NAMES`.
 
-    Where a number changes in the record, or has no single definition there, its value is the
-    mean over the distance, and `spread` holds what other definitions make of it.
+    If a number changes in the record or has no single definition, its value is the mean over the
+    distance, and `spread` covers the other definitions.
     """
     recorded = motion.time >= -1e-9
     position = motion.position[recorded]
@@ -156,9 +155,9 @@ def truth_of(
     end = body.area * instruments.pressure.drift * duration
     spring, preload = _springs(body, position, (0.5 * end, 0.0, end))
     coulomb, static = _frictions(plant, motion, middle)
-    # Friction that is larger upward is the same as a larger preload.
+    # Friction that is larger upward has the same effect as a larger preload.
     one_sided = abs(friction.asymmetry) * coulomb.value
-    # A diaphragm whose area differs here from the nominal one: all forces are seen by that factor.
+    # If the diaphragm area differs here from the nominal area, all forces scale by that factor.
     seen = 1.0 / (1.0 + body.area_change * (middle / body.travel - 0.5))
     sliding = _sliding(motion, recorded)
     return {

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Valves drawn by chance: every size, every friction, and consistent in themselves."""
+"""Randomly generated valves of all sizes and frictions, each consistent in itself."""
 
 import math
 from dataclasses import dataclass
@@ -20,28 +20,28 @@ _AREAS = (0.004, 0.12)
 _TRAVELS = (0.008, 0.08)
 _SPRINGS = (2e4, 2e6)
 _FRICTIONS = (0.003, 0.3)
-"""Areas, m²; travels, m; springs, N/m; F_c over the force of the spring through the travel."""
+"""Ranges of areas, m²; travels, m; springs, N/m; and F_c over the spring force of the travel."""
 
 _DIAPHRAGM = ((0.2e5, 1.0e5), (0.4e5, 2.0e5), (0.8e5, 2.4e5))
 _PISTON = ((0.5e5, 4.0e5), (1.0e5, 6.0e5))
 _SENSORS = (1.6e5, 2.5e5, 4e5, 6e5, 10e5)
-"""Ranges of the pressure in the actuator, and of the sensors that can be bought, Pa."""
+"""Pressure ranges of the actuator, and ranges of commercial sensors, Pa."""
 
 _SLIPS = (1.15, 2.0)
 _SLIP_SPEEDS = (0.3e-3, 5e-3)
 _LARGEST_JUMP = 0.1
-"""F_s over F_c of a packing that slips, its v_s (m/s), and the largest F_s − F_c, share of the
-force of the spring: beyond it a stem jumps through half its travel."""
+"""F_s over F_c of a slipping packing, its v_s (m/s), and the largest F_s − F_c, share of the spring
+force: beyond it the stem jumps through half its travel."""
 
 _VISCOUS = (0.1, 3.0)
 _SLOWEST = 0.6
-"""Viscous over Coulomb friction at the speed of a large step, and the largest F_v/k, over the
-filling time: a valve that is slower than its actuator is none."""
+"""Viscous over Coulomb friction at the speed of a large step, and the largest F_v/k over the
+filling time, since no real valve is slower than its actuator."""
 
 _FILLING = (0.9, 1.27e-3, 0.3)
 _MASS = (3.0, 1.27e-3, 0.8)
-"""Filling time (s) and mass (kg): of an actuator of this volume (m³), and the power of it by which
-they grow."""
+"""Laws of filling time (s) and mass (kg): value at a reference volume (m³), that volume, and the
+exponent of the volume."""
 
 _ABSOLUTE = 101325.0
 _OVERDRIVEN = 1.15
@@ -50,7 +50,7 @@ _OVERDRIVEN = 1.15
 
 @dataclass(frozen=True)
 class DrawnValve:
-    """A valve, and the converter that drives it.
+    """A valve and its converter.
 
     Attributes
     ----------
@@ -63,7 +63,7 @@ class DrawnValve:
     sensor : tuple of float
         Range of the pressure sensor, Pa.
     kind : str
-        "diaphragm", "piston" or "cylinder", the latter without a spring.
+        "diaphragm", "piston" or "cylinder"; a cylinder has no spring.
     """
 
     plant: Plant
@@ -75,19 +75,19 @@ class DrawnValve:
 
     @property
     def slips(self) -> bool:
-        """Whether the friction falls when the stem breaks away."""
+        """Whether friction falls at breakaway."""
         return self.plant.friction.static > self.plant.friction.coulomb
 
     @property
     def settling(self) -> float:
-        """Time, s, in which the stem follows a step of the command to a third."""
+        """Time, s, until a third of a command step remains."""
         if not self.plant.body.spring:
             return self.filling
         return self.filling + self.plant.friction.viscous / self.plant.body.spring
 
     @property
     def friction_share(self) -> float:
-        """F_c over the force of the spring; without one, over that of the actuator."""
+        """F_c over the spring force or, without a spring, over the actuator force."""
         body = self.plant.body
         whole = body.spring * body.travel or 0.5 * body.area * (self.high - self.low)
         return self.plant.friction.coulomb / whole
@@ -99,7 +99,7 @@ def log_uniform(random: np.random.Generator, low: float, high: float) -> float:
 
 
 def _size(random: np.random.Generator, largest_area: float) -> tuple[float, float]:
-    """Draw area and travel: large actuators have long ones, with much scatter."""
+    """Draw area and travel: large actuators have long travels, with much scatter."""
     while True:
         area = log_uniform(random, _AREAS[0], largest_area)
         travel = 0.012 * (area / _AREAS[0]) ** 0.5 * math.exp(random.uniform(-0.6, 0.6))
@@ -115,7 +115,7 @@ def _by_volume(law: tuple[float, float, float], volume: float, scatter: float) -
 def _packing(
     random: np.random.Generator, slips: bool, force: float, speed: float, stiffest: float
 ) -> Friction:
-    """Draw a packing: `force` of the spring (N), a typical `speed` (m/s), the largest F_v."""
+    """Draw a packing for a spring `force` (N), a typical `speed` (m/s) and the largest F_v."""
     ratio = log_uniform(random, *_SLIPS) if slips else 1.0
     largest = min(_FRICTIONS[1], _LARGEST_JUMP / max(ratio - 1.0, 1e-9))
     coulomb = force * log_uniform(random, _FRICTIONS[0], largest)
@@ -127,7 +127,7 @@ def _packing(
 def drawn_valve(random: np.random.Generator, slips: bool, reserve: float = 1.0) -> DrawnValve:
     """Draw a valve with a spring, whose actuator can stroke it against its friction.
 
-    `reserve` is the factor by which the friction may grow before it cannot.
+    `reserve` is the factor by which friction may grow while this remains true.
     """
     while True:
         piston = random.random() < 0.25
@@ -138,7 +138,7 @@ def drawn_valve(random: np.random.Generator, slips: bool, reserve: float = 1.0) 
         filling = _by_volume(_FILLING, volume, random.uniform(-0.7, 0.7))
         mass = _by_volume(_MASS, volume, random.uniform(-0.6, 0.6))
         speed = 0.4 * travel / filling
-        # With the force of the spring as unit, as the force of friction is a share of it.
+        # The spring force is the unit here, because friction is a share of it.
         share = _packing(random, slips, 1.0, speed, math.inf)
         beside = 1.1 * share.coulomb + 0.3 * (share.static - share.coulomb)
         force = area * (high - low) / (1.0 + 2.0 * reserve * beside)
@@ -162,7 +162,7 @@ def drawn_valve(random: np.random.Generator, slips: bool, reserve: float = 1.0) 
 
 
 def drawn_cylinder(random: np.random.Generator, slips: bool) -> DrawnValve:
-    """Draw a cylinder without a spring; its pressure is the difference of both chambers."""
+    """Draw a cylinder without a spring; its pressure is the difference between its chambers."""
     area, travel = _size(random, 0.03)
     highest = float(random.choice([1e5, 3e5, 6e5]))
     volume = area * travel

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The motion of a valve under a drive, compiled once for each law of friction."""
+"""The motion of a valve under a drive, compiled once per friction law."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -22,33 +22,33 @@ from benchmark.reality.plants.laws import INNER, SLIDING, V, X
 from benchmark.reality.plants.parameters import ELEMENTS, STEPS, Constants, Law, Plant, constants
 
 GRID = 1e-4
-"""Time between two points of the simulated signals, s."""
+"""Sample period of the simulated signals, s."""
 
 SUMS = 6
-"""Sums over the record: ∫|dx|, ∫|F·dx|, ∫F_c|dx|, ∫dt of motion, ∫F_c·dt of it, and the largest
-friction without its viscous part."""
+"""Number of sums over the record: ∫|dx|, ∫|F·dx|, ∫F_c|dx|, ∫dt of motion, ∫F_c·dt of motion, and
+the largest friction without its viscous part."""
 
 _LOWEST, _HIGHEST = -0.15, 1.15
-"""Limits of what a controller commands."""
+"""Limits of a controller's command."""
 
 
 class Loop(NamedTuple):
-    """How the command (0 to 1) is made, and the converter that turns it into pressure.
+    """The source of the command (0 to 1), and the converter from command to pressure.
 
     Attributes
     ----------
     closed : bool
-        Whether a controller makes the command; else the signal is the command itself.
+        Whether a controller sets the command; else the signal is the command.
     flow : bool
-        Whether the controller sees the flow; else the position of the stem.
+        Whether the controller measures the flow; else it measures the stem position.
     gain, integral_time : float
-        Of the PI controller; 1 and s.
+        Gain (1) and integral time (s) of the PI controller.
     every : int
-        Points of the grid between two actions of the controller.
+        Grid points per action of the controller.
     process_lag : float
         First-order lag, s, from opening to measured flow.
     bottom, span : float
-        Pressure at command 0, and its change to command 1, Pa.
+        Pressure at command 0, and its change from command 0 to 1, Pa.
     converter_lag : float
         First-order lag of the converter, s.
     """
@@ -66,14 +66,14 @@ class Loop(NamedTuple):
 
 @numba.njit(inline="always")
 def _trend(place: float, change: float, bend: float) -> float:
-    """Return 1 plus a change that runs from −½ to ½ of `change` while `place` runs from 0 to 1."""
+    """Return a change from −½ to ½ of `change` as `place` runs from 0 to 1."""
     middle = place - 0.5
     return change * (middle + bend * (2.0 * middle * middle - 1.0 / 6.0))
 
 
 @numba.njit
 def stem_pull(c: Constants, position: float, pressure: float) -> float:
-    """Return the force of actuator, spring and medium on the stem, N."""
+    """Return the net force of actuator, spring and medium on the stem, N."""
     place = position / c.travel
     area = c.area * (1.0 + c.area_change * (place - 0.5))
     curved = 0.5 * c.spring_curve * (place - 1.0)
@@ -85,7 +85,7 @@ def stem_pull(c: Constants, position: float, pressure: float) -> float:
 
 
 def _advancer(advance: Callable[..., float]) -> Callable[..., float]:
-    """Compile the motion from one point of the grid to the next with one law of friction."""
+    """Compile the motion between two grid points for one friction law."""
 
     @numba.njit(nogil=True)
     def travelled(
@@ -98,7 +98,7 @@ def _advancer(advance: Callable[..., float]) -> Callable[..., float]:
         step: float,
         sums: NDArray[np.float64],
     ) -> float:
-        """Advance by one point, add to the sums, and return the friction at its end."""
+        """Advance by one point, update the sums, and return the friction at the end."""
         distance, work, by_distance, moving, by_time = 0.0, 0.0, 0.0, 0.0, 0.0
         pressure, inside = pressures[0], pressures[1]
         friction, largest = 0.0, 0.0
@@ -138,7 +138,7 @@ def _advancer(advance: Callable[..., float]) -> Callable[..., float]:
 
 @numba.njit
 def _controlled(loop: Loop, error: float, integral: float) -> tuple[float, float]:
-    """Return what a PI controller commands, and its integral."""
+    """Return command and integral of a PI controller."""
     rate = loop.gain * error / loop.integral_time
     integral = min(max(integral + rate * loop.every * GRID, _LOWEST), _HIGHEST)
     return min(max(loop.gain * error + integral, _LOWEST), _HIGHEST), integral
@@ -146,17 +146,17 @@ def _controlled(loop: Loop, error: float, integral: float) -> tuple[float, float
 
 @numba.njit
 def _seen(loop: Loop, measured: float, opening: float) -> float:
-    """Return what the controller measures: the opening, or the flow that follows it."""
+    """Return the measurement of the controller: the opening, or the flow that follows it."""
     if loop.flow:
         return measured + GRID / loop.process_lag * (opening - measured)
     return opening
 
 
 def _runner(advance: Callable[..., float]) -> Callable[..., Any]:
-    """Compile the motion of a whole record with one law of friction.
+    """Compile the motion of a whole record for one friction law.
 
-    It is compiled anew in each process: numba does not notice that a cached kernel calls another
-    one that has changed, and a benchmark must not measure with yesterday's plant.
+    Each process compiles it again: numba does not notice changes in the functions that a cached
+    kernel calls, and a benchmark must not use an outdated plant.
     """
     travelled = _advancer(advance)
 
@@ -173,8 +173,7 @@ def _runner(advance: Callable[..., float]) -> Callable[..., Any]:
     ) -> None:
         """Fill the rows of `outputs`: pressure, position and friction at each point.
 
-        `first` is the point of the grid at which the record begins; the sums and the trend in
-        time begin there.
+        The record begins at grid point `first`; so do the sums and the trend in time.
         """
         state = np.zeros(INNER + ELEMENTS)
         command = integral = signal[0]
@@ -204,7 +203,7 @@ def _runner(advance: Callable[..., float]) -> Callable[..., Any]:
 
 @numba.njit
 def _balance(c: Constants, pressure: float) -> float:
-    """Return where spring and actuator balance, m, by bisection over the travel."""
+    """Return the equilibrium position, m, by bisection over the travel."""
     low, high = c.lowest, c.highest
     for _ in range(60):
         middle = 0.5 * (low + high)
@@ -219,7 +218,7 @@ _RUNNERS: dict[Law, Callable[..., Any]] = {}
 
 
 def runner_of(law: Law) -> Callable[..., Any]:
-    """Return the compiled motion of a law; made at the first call."""
+    """Return the compiled motion of a law; the first call compiles it."""
     if law not in _RUNNERS:
         _RUNNERS[law] = _runner(getattr(laws, law.value))
     return _RUNNERS[law]
@@ -234,9 +233,9 @@ class Motion:
     begin : float
         Time of the first point, s; the record begins at 0.
     pressure : ndarray of float, shape (n,)
-        Pressure where the sensor is, Pa.
+        Pressure at the sensor, Pa.
     position, friction : ndarray of float, shape (n,)
-        Position of the stem (m) and friction force (N, against upward motion).
+        Stem position (m) and friction force (N, positive against upward motion).
     distance, work : float
         ∫|dx| (m) and ∫|F·dx| (J) of the record.
     coulomb_by_distance, coulomb_by_time : float
@@ -279,18 +278,18 @@ def move(
     loop : Loop
         Converter, and controller if there is one.
     signal : ndarray of float, shape (n,)
-        Command or set point, 0 to 1, at the points of the grid.
+        Command or set point, 0 to 1, at the grid points.
     disturbance : ndarray of float, shape (m,)
-        Noise of what the controller measures, 1, at each of its actions.
+        Measurement noise of the controller, 1, at each of its actions.
     before : float
-        Time between the first point and the begin of the record, s.
+        Time from the first point to the start of the record, s.
     step : float, optional
         Largest time step, s; by default that of the law.
 
     Returns
     -------
     Motion
-        Pressure, position and friction at all points; the sums only of the record.
+        Pressure, position and friction at all points; sums over the record only.
     """
     law = plant.friction.law
     substeps = int(np.ceil(GRID / (step or STEPS[law]) - 1e-9))

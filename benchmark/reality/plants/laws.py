@@ -7,12 +7,12 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""One time step of each law of friction, compiled.
+"""One compiled time step of each friction law.
 
-A step takes the numbers of the plant, the state, the force that pulls at the stem (N), the scale
-of the friction at this place and time, and the step (s). It writes the new speed into the state
-and returns the friction force, N, positive where it acts against upward motion. The state holds
-position, speed, whether the stem has broken away (1 or 0), and inner displacements or forces.
+A step takes the plant's constants, the state, the net force on the stem (N), the scale of friction
+at this place and time, and the step (s). It writes the new speed into the state and returns the
+friction force, N, positive against upward motion. The state contains position, speed, whether the
+stem has broken away (1 or 0), and internal displacements or forces.
 """
 
 import math
@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from benchmark.reality.plants.parameters import ELEMENTS, Constants
 
 X, V, SLIDING, INNER = 0, 1, 2, 3
-"""Places in the state: position, speed, broken away, and the first inner number."""
+"""Indices in the state: position, speed, broken away, and the first internal variable."""
 
 _State = NDArray[np.float64]
 
@@ -36,7 +36,7 @@ def _way(value: float) -> float:
 
 @numba.njit(inline="always")
 def _level(c: Constants, speed: float) -> float:
-    """Return the friction, N, without its viscous part, at a speed ≥ 0 (Stribeck's curve)."""
+    """Return the friction, N, without its viscous part, at a speed ≥ 0 (Stribeck curve)."""
     if speed == 0.0:
         return c.static
     if c.stribeck_velocity == 0.0 or c.static == c.coulomb:
@@ -49,7 +49,7 @@ def _level(c: Constants, speed: float) -> float:
 
 @numba.njit
 def moreau(c: Constants, state: _State, pull: float, scale: float, step: float) -> float:
-    """Step the set-valued law implicitly (Moreau, 1988): no speed is called zero but zero."""
+    """Step the set-valued law implicitly (Moreau, 1988), with rest at exactly zero speed."""
     impulse = c.mass * state[V] + step * pull
     way = _way(impulse)
     level = scale * (1.0 + way * c.asymmetry) * _level(c, abs(state[V]))
@@ -62,7 +62,7 @@ def moreau(c: Constants, state: _State, pull: float, scale: float, step: float) 
 
 @numba.njit(inline="always")
 def _slide(c: Constants, state: _State, pull: float, scale: float, step: float) -> float:
-    """Step a sliding stem under Coulomb and viscous friction; it stops where it would reverse."""
+    """Step a sliding stem with Coulomb and viscous friction; stop it where it would reverse."""
     way = _way(state[V]) if state[V] != 0.0 else _way(pull)
     level = scale * (1.0 + way * c.asymmetry) * c.coulomb
     before = c.mass * state[V] + step * pull
@@ -90,7 +90,7 @@ def karnopp(c: Constants, state: _State, pull: float, scale: float, step: float)
 
 @numba.njit
 def latched(c: Constants, state: _State, pull: float, scale: float, step: float) -> float:
-    """Step the Karnopp law whose static friction acts at rest and on a stem that slows down."""
+    """Step the Karnopp law with static friction only at rest and on a stem that slows down."""
     way = _way(pull)
     limit = scale * (1.0 + way * c.asymmetry) * c.static
     if state[V] == 0.0:
@@ -108,7 +108,7 @@ def latched(c: Constants, state: _State, pull: float, scale: float, step: float)
 
 @numba.njit
 def lugre(c: Constants, state: _State, pull: float, scale: float, step: float) -> float:
-    """Step a bristle of one stiffness, implicit in speed and bend, explicit in their product."""
+    """Step a linear bristle, implicit in speed and deflection, explicit in their product."""
     speed = state[V]
     level = scale * (1.0 + _way(speed) * c.asymmetry) * _level(c, abs(speed))
     decay = c.stiffness * abs(speed) / level
@@ -123,7 +123,7 @@ def lugre(c: Constants, state: _State, pull: float, scale: float, step: float) -
 
 @numba.njit
 def maxwell(c: Constants, state: _State, pull: float, scale: float, step: float) -> float:
-    """Step springs in parallel that hold an equal share of the friction each, then slip."""
+    """Step parallel springs, each of which carries an equal share of the friction, then slips."""
     held = 0.0
     for element in range(ELEMENTS):
         held += state[INNER + element]

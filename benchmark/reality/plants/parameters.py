@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""What a simulated valve is made of: body, friction, and how either deviates from the ideal."""
+"""Parameters of a simulated valve: body and friction, with their deviations from the ideal."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -18,11 +18,11 @@ from typing import NamedTuple
 import numpy as np
 
 PRESSURE_RANGE = (41740.0, 206840.0)
-"""Pressure of the converter at 0 % and 100 % of its input, Pa."""
+"""Converter pressure at 0 % and 100 % input, Pa."""
 
 
 class Law(Enum):
-    """How the friction force follows from the motion."""
+    """Law of the friction force as a function of the motion."""
 
     MOREAU = "moreau"
     """Set-valued at rest; falls from static to Coulomb friction with speed (Stribeck)."""
@@ -31,7 +31,7 @@ class Law(Enum):
     """Equation (2) to the letter: below the limit velocity static friction acts."""
 
     LATCHED = "latched"
-    """Karnopp, but a stem that has broken away slides until its speed falls to the limit."""
+    """Karnopp, but after breakaway the stem slides until its speed falls below the limit."""
 
     LUGRE = "lugre"
     """A bristle that bends before the stem slides (Canudas de Wit, 1995)."""
@@ -42,14 +42,14 @@ class Law(Enum):
 
 @dataclass(frozen=True)
 class Trend:
-    """A smooth relative change from the beginning to the end of something.
+    """A smooth relative change over the travel or the record.
 
     Attributes
     ----------
     change : float
-        Relative change from 0 to 1 of the run, about its middle.
+        Total relative change from start to end, around the middle.
     bend : float
-        Curvature: the share of `change` that is reached by a parabola, between −1 and 1.
+        Curvature: parabolic part as a share of `change`, between −1 and 1.
     """
 
     change: float = 0.0
@@ -65,15 +65,15 @@ class Friction:
     coulomb, static, viscous : float
         F_c (N), F_s (N) and F_v (N·s/m).
     stribeck_velocity : float
-        Speed, m/s, at which the fall from F_s to F_c is a factor of e down; 0: at once.
+        Speed, m/s, at which the excess of F_s over F_c has fallen by a factor of e; 0: at once.
     law : Law
-        How the force follows from the motion.
+        Friction law.
     presliding : float
-        Displacement, m, over which the force is built up, of LuGre and Maxwell.
+        Displacement, m, over which the force builds up, for LuGre and Maxwell.
     limit_velocity : float
         DV of the two Karnopp laws, m/s.
     asymmetry : float
-        Relative excess of F_c and F_s upward, and lack of it downward.
+        Relative excess of F_c and F_s upward, and their relative deficit downward.
     along_travel : Trend
         Change of F_c and F_s from the seat to the end of the travel.
     in_record : Trend
@@ -103,7 +103,7 @@ class Friction:
 
 @dataclass(frozen=True)
 class Body:
-    """Everything of a valve but its friction.
+    """All parameters of a valve except friction.
 
     Attributes
     ----------
@@ -114,9 +114,9 @@ class Body:
     spring_curve, area_change : float
         Relative change of stiffness and of area from the seat to the end of the travel.
     flow_force, flow_exponent : float
-        Force of the medium at full travel, N, downward; it rises with this power of the opening.
+        Downward force of the medium at full travel, N, and exponent of its rise with the opening.
     seat, top : float
-        Where the stops are, m from the nominal ones, inward positive.
+        Distances of the stops from their nominal positions, m, positive inward.
     volume_lag : float
         First-order lag, s, from the pressure sensor to the diaphragm.
     """
@@ -153,7 +153,7 @@ PACKINGS: Mapping[str, Plant] = MappingProxyType(
         ),
     }
 )
-"""The paper's bench valve, lightly and strongly tightened, and with a graphite packing."""
+"""The paper's bench valve with light and with strong tightening, and a graphite packing."""
 
 STEPS = {
     Law.MOREAU: 5e-6,
@@ -165,17 +165,14 @@ STEPS = {
 """Time step of each law, s."""
 
 ELEMENTS = 6
-"""Springs of the Maxwell law."""
+"""Number of springs in the Maxwell law."""
 
 _BRISTLE_DAMPING = 0.7
 """Damping ratio of stem and bristle before sliding."""
 
 
 class Constants(NamedTuple):
-    """A plant as plain numbers, the form in which compiled code takes it; SI units.
-
-    See `Body` and `Friction` for their meaning.
-    """
+    """A plant as plain numbers for compiled code, in SI units; see `Body` and `Friction`."""
 
     mass: float
     spring: float
@@ -205,7 +202,7 @@ class Constants(NamedTuple):
 
 
 def constants(plant: Plant) -> Constants:
-    """Return the numbers of a plant."""
+    """Return the constants of a plant."""
     body, friction = plant.body, plant.friction
     bends = friction.law in (Law.LUGRE, Law.MAXWELL)
     stiffness = friction.static / friction.presliding if bends else 0.0
