@@ -7,8 +7,8 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Weeks of a valve in closed-loop service, to measure the evidence of its moves: `make service`.
+"""Weeks of a valve in closed-loop service, to test the evidence from its moves: `make service`.
 
-The plants are those of `benchmark.reality`, which shares no code with the package: friction by
-Stribeck's curve or by bristles, sensors with noise, converters and late stamps.
+The plants come from `benchmark.reality`, which shares no code with the package. They have Stribeck
+or bristle friction, and sensors with noise, converters and late stamps.
 """

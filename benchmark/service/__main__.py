@@ -28,7 +28,7 @@ _BRIEF = ("low", "high", "graphite", "stick-slip")
 _WIDTH_OF_A_FILE = 150
 _STEP_HOURS, _SLOW_HOURS, _WEEKS_HOURS = 12, 40, 8 * 7 * 24
 _QUIET = "stick-slip"
-"""Valve whose friction grows over eight weeks."""
+"""Valve with friction that grows over eight weeks."""
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -70,7 +70,7 @@ def _tasks(options: argparse.Namespace) -> list[Task]:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run what was asked for; return 1 if a bound is missed."""
+    """Run the requested tasks; return 1 if a bound is missed."""
     options = _parser().parse_args(arguments)
     console = Console(width=None if sys.stdout.isatty() else _WIDTH_OF_A_FILE)
     tasks = _tasks(options)
@@ -84,7 +84,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 task = told[-1].task
                 line = f"{len(told)}/{len(tasks)} {task.plant}, {task.course}, {task.hours} h"
                 console.print(line, highlight=False)
-        except KeyboardInterrupt:  # show what is done
+        except KeyboardInterrupt:  # show the results so far
             pool.shutdown(wait=False, cancel_futures=True)
     for table in tables(told):
         console.print(table)

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""What a valve in service does over hours, and the moves that its samples are cut into."""
+"""Hours of service of a valve, and the moves extracted from its samples."""
 
 import math
 from collections.abc import Callable, Iterator
@@ -38,7 +38,7 @@ class Stretch(NamedTuple):
     stamps : tuple of ndarray of int64
         Times of pressure and position, ns.
     pressure, position : ndarray of float
-        What the sensors say, Pa and m.
+        Measured values, Pa and m.
     work, distance : float
         ∫|F·dx| and ∫|dx| of the true motion, J and m.
     """
@@ -94,19 +94,19 @@ def stretches(
     duty: Callable[[float], Duty],
     spacing: float = STRETCH,
 ) -> Iterator[Stretch]:
-    """Serve for some hours, by a seed of set points and noise; yield ten minutes at a time.
+    """Simulate hours of service with random set points and noise; yield ten minutes at a time.
 
     Parameters
     ----------
     friction : callable
         Friction at an hour, over that of the plant.
     offset : callable
-        Force, N, by which the preload has moved at an hour.
+        Shift of the preload at an hour, N.
     duty : callable
         Set points at an hour.
     spacing : float
-        Time, s, from the begin of one stretch to that of the next; between them the valve is shut
-        off, as it stands.
+        Time, s, between the starts of successive stretches; in between the valve is shut off in its
+        present state.
     """
     random = np.random.default_rng([seed, 7])
     loop, senses, plant = valve.loop, valve.senses, valve.plant
@@ -148,24 +148,24 @@ def stretches(
 
 
 PER_HOUR = round(3600.0 / STRETCH)
-"""Stretches of an hour."""
+"""Stretches per hour."""
 
 BEFORE = 3
 """Hours before friction may change."""
 
 _DAY = 24.0
 _QUIET = 4 * 3600.0
-"""Time, s, from one ten minutes of work of a quiet valve to the next."""
+"""Time, s, between the starts of two working stretches of a quiet valve."""
 
 _SLOW = ("slow", "weeks")
 
 
 @dataclass(frozen=True)
 class Task:
-    """What is tried: a plant, hours, a seed, and what its friction does.
+    """A trial: plant, hours, seed, and course of the friction.
 
-    It is steady, or grows to 1.5 times in a step, or slowly, or over `weeks` in a valve that works
-    ten minutes in every four hours.
+    Friction is steady, or grows to 1.5 times: in a step, slowly, or over `weeks` in a valve that
+    works ten minutes in every four hours.
     """
 
     plant: str
@@ -176,7 +176,7 @@ class Task:
 
 @dataclass(frozen=True)
 class Served:
-    """Ten minutes of service, until an hour: moves that ended, and ∫|F·dx| (J) and ∫|dx| (m)."""
+    """Ten minutes of service up to an hour: completed moves, ∫|F·dx| (J) and ∫|dx| (m)."""
 
     hour: float
     moves: tuple[Move, ...]
@@ -185,7 +185,7 @@ class Served:
 
 
 class Course:
-    """What friction, preload and set points do; all but friction is no change."""
+    """Course of friction, preload and set points; only friction is a change to declare."""
 
     def __init__(self, task: Task, valve: ServiceValve) -> None:
         self._task = task
@@ -205,11 +205,11 @@ class Course:
         return 1.0
 
     def offset(self, hour: float) -> float:
-        """Return how far a warm day moves the zero of the pressure, N."""
+        """Return the daily drift of the pressure zero with temperature, N."""
         return self._drift * math.sin(2 * math.pi * (hour - self._phase) / _DAY)
 
     def duty(self, hour: float) -> Duty:
-        """Return other steps, periods and ranges in each part of some days, from the second on."""
+        """Return steps, period and range, which change every eight hours after the first eight."""
         part = int(hour // 8)
         if self._task.course == "weeks" or part == 0 or self._duty.high - self._duty.low < 0.1:
             return self._duty
@@ -232,18 +232,18 @@ class Course:
 
     @property
     def reached(self) -> float:
-        """Hour at which friction has reached 1.5."""
+        """Hour at which friction has reached 1.5 times."""
         return self.at if self._task.course == "step" else float(self._task.hours - 2)
 
 
 def known_valve(valve: ServiceValve) -> Valve:
-    """Return what an identifier knows of it."""
+    """Return the valve as an identifier knows it."""
     body = valve.plant.body
     return Valve(body.area, body.pressure_reference, body.travel)
 
 
 def served(task: Task) -> Iterator[Served]:
-    """Simulate the service of a task, and cut it into moves."""
+    """Simulate the service of a task, and extract its moves."""
     valve = valve_of(task.plant)
     course, stream = Course(task, valve), MoveStream(known_valve(valve))
     spacing = _QUIET if task.course == "weeks" else STRETCH

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The motion of a valve in a control loop over hours, sampled as its sensors see it."""
+"""The motion of a valve in a control loop over hours, sampled at the rate of its sensors."""
 
 import math
 from collections.abc import Callable
@@ -23,25 +23,25 @@ from benchmark.reality.plants.laws import INNER, V, X
 from benchmark.reality.plants.parameters import ELEMENTS, Constants, Law
 
 SUMS = 2
-"""Sums over the motion: ∫|dx| and ∫|F·dx|."""
+"""Number of sums over the motion: ∫|dx| and ∫|F·dx|."""
 
 _COMMAND, _INTEGRAL, _PRESSURE, _MEASURED = range(4)
 _LOWEST, _HIGHEST = -0.15, 1.15
 
 
 class Loop(NamedTuple):
-    """A PI controller of the position, and the converter that it drives.
+    """A PI position controller and its converter.
 
     Attributes
     ----------
     gain, integral_time : float
-        Of the controller; 1 and s.
+        Gain (1) and integral time (s) of the controller.
     action_period : float
         Time between two actions, s.
     process_lag : float
-        First-order lag of what the controller measures, s.
+        First-order lag of the controller's measurement, s.
     bottom, span : float
-        Pressure at command 0, and its change to command 1, Pa.
+        Pressure at command 0, and its change from command 0 to 1, Pa.
     converter_lag : float
         First-order lag of the converter, s.
     """
@@ -56,7 +56,7 @@ class Loop(NamedTuple):
 
 
 def new_state(loop: Loop, opening: float, travel: float) -> NDArray[np.float64]:
-    """Return the state of a valve at rest at an opening, 0 to 1: loop first, then stem."""
+    """Return the state at rest at an opening, 0 to 1: first the loop, then the stem."""
     state = np.zeros(4 + INNER + ELEMENTS)
     state[_COMMAND] = state[_INTEGRAL] = state[_MEASURED] = opening
     state[_PRESSURE] = loop.bottom + loop.span * opening
@@ -66,7 +66,7 @@ def new_state(loop: Loop, opening: float, travel: float) -> NDArray[np.float64]:
 
 @numba.njit(inline="always")
 def _rests(c: Constants, pull: float, scale: float) -> bool:
-    """Return whether a stem at rest stays so."""
+    """Return whether a resting stem remains at rest."""
     way = 1.0 if pull > 0.0 else -1.0
     return abs(pull) < scale * (1.0 + way * c.asymmetry) * c.static
 
@@ -75,11 +75,11 @@ def _rests(c: Constants, pull: float, scale: float) -> bool:
 def _rest(
     c: Constants, loop: Loop, now: tuple[float, float, float, float], most: float, step: float
 ) -> tuple[float, float]:
-    """Return a time, s, over which a stem surely rests, and the pressure after it, Pa.
+    """Return a time, s, over which the stem surely rests, and the pressure after it, Pa.
 
-    The state `now` is position, pressure, its target, and the scale of the friction. The pressure
-    runs one way until the next event, so what holds at the end holds before. No longer than `step`:
-    the stem may leave its rest.
+    The state `now` is position, pressure, its target, and the scale of friction. The pressure is
+    monotonic until the next event, so a stem that rests at the end rests before it. If the time is
+    no longer than `step`, the stem may break away.
     """
     position, pressure, target, scale = now
     while most > step:
@@ -113,9 +113,9 @@ def _runner(advance: Callable[..., float], skips: bool) -> Callable[..., Any]:
         outputs: NDArray[np.float64],
         sums: NDArray[np.float64],
     ) -> None:
-        """Go on from state `whole`; row 0 of `outputs` becomes pressure, row 1 position.
+        """Continue from state `whole`; fill `outputs` with pressure (row 0) and position (row 1).
 
-        There is a set point and a noise for each action of the controller.
+        Each action of the controller has a set point and a noise value.
         """
         stem = whole[4:]
         pressure = whole[_PRESSURE]
@@ -170,7 +170,7 @@ _RUNNERS: dict[Law, Callable[..., Any]] = {}
 
 
 def runner_of(law: Law) -> Callable[..., Any]:
-    """Return the compiled service of a law of friction; made at the first call."""
+    """Return the compiled service for a friction law; the first call compiles it."""
     if law not in _RUNNERS:
         skips = law in (Law.MOREAU, Law.KARNOPP, Law.LATCHED)
         _RUNNERS[law] = _runner(getattr(laws, law.value), skips)

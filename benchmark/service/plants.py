@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The valves in service, their loops and their sensors; some drawn, each from its own number."""
+"""Valves in service with their loops and sensors; some are random, each from its own number."""
 
 import math
 from collections.abc import Mapping
@@ -23,22 +23,22 @@ from benchmark.service.kernel import Loop
 
 @dataclass(frozen=True)
 class Senses:
-    """What the sensors make of the true signals.
+    """The sensors of a valve.
 
     Attributes
     ----------
     rate : float
-        Samples of each signal in a second.
+        Samples per second of each signal.
     position_noise, pressure_noise : float
         Standard deviations, m and Pa.
     position_step, pressure_step : float
-        Steps of the converters, m and Pa; 0: none.
+        Quantisation steps, m and Pa; 0 for none.
     jitter : float
         Standard deviation of the stamps, as a share of the period.
     lag : float
-        Time by which the stamps of the pressure are late, s.
+        Delay of the pressure stamps, s.
     hold : int
-        Samples for which a value of the pressure is repeated; 1: none.
+        Number of samples with the same pressure value; 1 for no repetition.
     """
 
     rate: float = 40.0
@@ -53,7 +53,7 @@ class Senses:
 
 @dataclass(frozen=True)
 class Duty:
-    """What the set point does.
+    """The course of the set point.
 
     Attributes
     ----------
@@ -62,7 +62,7 @@ class Duty:
     period : float
         Time from one step to the next, s.
     low, high : float
-        Range of the set point; the steps alternate where it is one step wide.
+        Range of the set point; a range one step wide makes the steps alternate.
     """
 
     step: float = 0.03
@@ -73,7 +73,7 @@ class Duty:
 
 @dataclass(frozen=True)
 class ServiceValve:
-    """A valve in service: plant, time step (s) of its simulation, loop, set points and sensors."""
+    """A valve in service: plant, time step (s) of the simulation, loop, set points and sensors."""
 
     plant: Plant
     step: float
@@ -130,17 +130,17 @@ PLANTS: Mapping[str, ServiceValve] = MappingProxyType(
         ),
     }
 )
-"""The paper's packings in closed loop, and what plants add to them."""
+"""The paper's packings in closed loop, with imperfections of real plants."""
 
 PREFIX = "drawn"
-"""Of the name of a drawn valve; its number follows."""
+"""Prefix of the name of a random valve; its number follows."""
 
 _LAWS = (Law.MOREAU, Law.MOREAU, Law.KARNOPP, Law.LATCHED, Law.LATCHED, Law.LUGRE, Law.MAXWELL)
 _STEPS = {Law.KARNOPP: 2e-5, Law.LATCHED: 2e-5, Law.LUGRE: 8e-5, Law.MAXWELL: 4e-5}
 
 
 def valve_of(name: str) -> ServiceValve:
-    """Return a valve of `PLANTS`, or the one drawn from the number after `PREFIX`."""
+    """Return a valve of `PLANTS`, or the random valve with the number after `PREFIX`."""
     prefix, _, number = name.partition(" ")
     return _drawn(int(number)) if prefix == PREFIX else PLANTS[name]
 
@@ -179,7 +179,7 @@ def _drawn(number: int) -> ServiceValve:
 
 
 def _between(random: np.random.Generator, low: float, high: float) -> float:
-    """Return a number whose logarithm is uniform."""
+    """Draw a number with a uniform logarithm."""
     return float(math.exp(random.uniform(math.log(low), math.log(high))))
 
 

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Tables of the services that were tried."""
+"""Tables of the simulated services."""
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
@@ -20,11 +20,11 @@ from benchmark.service.trial import Number, Told
 
 _NAMES = ("sliding_friction", "static_friction", "dead_band")
 _SPREAD = "alternating"
-"""Valve whose set points hardly leave their place: its dead band may be wide, if it says so."""
+"""Valve with nearly constant set points: its dead band may have a wide interval."""
 
 
 def _errors(numbers: Sequence[Number]) -> tuple[int, int, float, float, float]:
-    """Return how many there are, how many withheld, median and largest error, and coverage."""
+    """Return count, number withheld, median and largest error, and coverage."""
     known = [one for one in numbers if math.isfinite(one.value)]
     if not known:
         return len(numbers), len(numbers), math.nan, math.nan, math.nan
@@ -95,20 +95,20 @@ def tables(told: Sequence[Told]) -> list[Table]:
 
 
 def _within(numbers: Sequence[Number]) -> bool:
-    """Return whether every hour has its number, within 10 % of the truth."""
+    """Return whether every hour has a number within 10 % of the truth."""
     _, withheld, _, largest, _ = _errors(numbers)
     return withheld == 0 and largest <= 0.1
 
 
 def _covers(numbers: Sequence[Number]) -> bool:
-    """Return whether 95 % lie inside their intervals; one of few may lie outside."""
+    """Return whether 95 % lie inside their intervals; one outside is always allowed."""
     known = [one for one in numbers if math.isfinite(one.value)]
     outside = sum(abs(one.value - one.truth) > one.half_width for one in known)
     return outside <= max(1, 0.05 * len(known))
 
 
 def bounds_met(told: Sequence[Told], console: Console) -> bool:
-    """Print each bound and what was reached; return whether all are met."""
+    """Print whether each bound is met; return whether all are."""
     every = [[_of(group, name) for name in _NAMES] for _, group in _by_plant(told)]
     steady, steps = _in_course(told, "steady"), _in_course(told, "step")
     slow = _in_course(told, "slow", "weeks")

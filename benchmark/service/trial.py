@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""One valve over hours of service: what its evidence says, beside what is true."""
+"""One valve over hours of service: its evidence compared with the truth."""
 
 import contextlib
 import math
@@ -34,12 +34,12 @@ from valve_friction_ros.model.valve import Valve
 
 _BEGIN = 1_700_000_000
 _SAME = 3600e9
-"""Time of the first sample, s; and between two dates of one change, ns."""
+"""Time of the first sample, s, and largest difference between two dates of the same change, ns."""
 
 
 @dataclass(frozen=True)
 class Number:
-    """A number of one hour's moves beside the truth; nan where it was withheld."""
+    """A number from the moves of one hour, with its truth; nan if withheld."""
 
     name: str
     truth: float
@@ -49,25 +49,25 @@ class Number:
 
 @dataclass
 class Told:
-    """What became of a task.
+    """The outcome of a task.
 
     Attributes
     ----------
     task : Task
         The task.
     numbers : list of Number
-        Of each hour by itself.
+        Numbers from single hours.
     changes, alarms : int
         Declared changes, and rises of the level against the baseline, before friction changed.
     declared, alarmed : float
-        Hours from the change of friction until it was declared, and until the level rose; nan
-        where it was not. For slow growth, from when it has reached 1.5.
+        Hours from the change of friction to its declaration, and to the rise of the level; nan if
+        it did not happen. For slow growth, hours after friction reached 1.5 times.
     alarmed_by_reference : float
-        As `alarmed`, of a valve without a baseline, by what its moves said first.
+        Like `alarmed`, for a valve without a baseline, by the reference from its first moves.
     dated : bool or None
-        Whether the change lies in its interval.
+        Whether the true time of the change lies in its interval.
     late : list of Number
-        Sliding friction by all evidence at the end.
+        Numbers from all evidence at the end.
     """
 
     task: Task
@@ -95,14 +95,14 @@ def _truths(
 
 
 def _stiffness(valve: ServiceValve) -> float:
-    """Return by how much the pull falls over the range of the set points, N/m."""
+    """Return the mean stiffness over the range of the set points, N/m."""
     numbers, travel = constants(valve.plant), valve.plant.body.travel
     low, high = valve.duty.low * travel, valve.duty.high * travel
     return float(stem_pull(numbers, low, 0.0) - stem_pull(numbers, high, 0.0)) / (high - low)
 
 
 class _Watched:
-    """The evidence of a valve, as an identifier gathers it, and what it declares."""
+    """The evidence of a valve, gathered like in an identifier, and its declarations."""
 
     def __init__(self, task: Task, valve: Valve, course: Course) -> None:
         self._valve, self._course = valve, course
@@ -117,7 +117,7 @@ class _Watched:
         self.evidence = evidence_of([], valve)
 
     def take(self, hour: float, moves: Iterable[Move]) -> None:
-        """Take the moves of ten minutes that end at an hour."""
+        """Take the moves of the ten minutes before an hour."""
         self._ledger.extend(moves)
         self.evidence = evidence_of(list(self._ledger), self._valve)
         self._reference = self._reference or reference_by_evidence(self.evidence)
@@ -139,7 +139,7 @@ class _Watched:
             told.declared = hour - self._course.reached
 
     def _alarm(self, hour: float) -> None:
-        """Note the alarms with a baseline, and those of a valve that has none."""
+        """Note the alarms with a baseline and without one."""
         told = self.told
         cases = (("alarmed", self._baseline, None), ("alarmed_by_reference", None, self._reference))
         for name, baseline, reference in cases:
@@ -157,12 +157,12 @@ class _Watched:
 
 
 def tried(task: Task) -> Told:
-    """Simulate the service of a task, and take its evidence every ten minutes."""
+    """Simulate the service of a task, and evaluate it every ten minutes."""
     return judged(task, served(task))
 
 
 def judged(task: Task, service: Iterable[Served]) -> Told:
-    """Take the evidence of a service every ten minutes."""
+    """Evaluate a service every ten minutes."""
     plant = valve_of(task.plant)
     course, valve = Course(task, plant), known_valve(plant)
     watched = _Watched(task, valve, course)
@@ -177,7 +177,7 @@ def judged(task: Task, service: Iterable[Served]) -> Told:
             continue
         hour = part.hour
         scale = course.friction(hour - 1e-6)
-        if distance > 0:  # a stem that stood still has no sliding friction
+        if distance > 0:  # a resting stem has no sliding friction
             truth = work / distance
             if scale == course.friction(hour - 1.0):
                 told.numbers += _truths(evidence_of(moves, valve), plant, scale, truth)

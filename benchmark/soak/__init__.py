@@ -7,4 +7,4 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""A month of a plant in an hour, with all that happens to plants; each sample is accounted for."""
+"""A month of a plant in an hour, with the usual faults; every sample is accounted for."""

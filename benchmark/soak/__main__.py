@@ -32,7 +32,7 @@ from valve_friction_ros.history import HistoryFile
 _MONTH = 30 * 86_400 * 10**9
 _GROWTH = {"/fv_101": 1.0, "/fv_102": 1.6, "/fv_201": 1.0, "/fv_202": 2.5}
 _OF_NOW = "/fv_301"
-"""Valve whose sensors speak by the clock of now; theirs is the nonsense."""
+"""Valve whose sensors stamp with the present time; its sensors also send nonsense."""
 _TURN = 0.02
 _PAUSE = 3.0
 """Mean time between two records of a valve, s."""
@@ -42,11 +42,11 @@ _ASKED, _OTHERS = 0.6, SERVICES[1:]
 _OTHER = 0.03
 _START_LIMIT = 120.0
 _LOOKS = (0.1, 0.25, 0.5, 0.75)
-"""Shares of the month at which the memory is looked at, besides its end."""
+"""Shares of the month at which memory is measured, besides the end."""
 
 
 def _processes(folder: Path, disk: Path, url: str) -> list[Process]:
-    """Start identifiers of one valve each, and a process of two that lives through all."""
+    """Start identifiers of one valve each, and a process of two that lasts the whole month."""
     common = [
         "--params-file",
         str(BENCH),
@@ -90,7 +90,7 @@ class _Month:
         return (time.monotonic() - self._begin) / self._seconds
 
     def turn(self) -> None:
-        """Send a piece to each valve that works, and let faults go on."""
+        """Send a piece to each working valve, and advance the faults."""
         site = self._site
         for valve in site.feeds:
             self._feed(valve)
@@ -105,7 +105,7 @@ class _Month:
         self._look()
 
     def _go_on(self) -> None:
-        """Let the sensors of the valve of now say what is due, and each fault take its step."""
+        """Send the due samples of the valve `_OF_NOW`, and advance each fault by a step."""
         plant = self._site.plant
         if time.monotonic() >= self._next_word and plant.is_ready(_OF_NOW):
             self._next_word = time.monotonic() + PERIOD
@@ -143,7 +143,7 @@ class _Month:
                 process.begin()
 
     def finish(self) -> None:
-        """Let each fault end, and let everything that was sent be accounted for."""
+        """Let all faults end, and wait until all sent samples are accounted for."""
         plant = self._site.plant
         deadline = time.monotonic() + _START_LIMIT
         while self._faults and time.monotonic() < deadline:
@@ -156,19 +156,19 @@ class _Month:
 
 
 def _is_waiting(process: Process) -> bool:
-    """Tell whether rows of a process wait for the server."""
+    """Return whether rows of a process wait for the server."""
     waiting = [one.get("history_server waiting", "0") for one in process.life.told.values()]
     return any(count != "0" for count in waiting)
 
 
 def _stored(path: Path, valves: Sequence[str]) -> Mapping[str, int]:
-    """Count the identifications in the history."""
+    """Count the identifications in the history by valve."""
     file = HistoryFile(path)
     return {valve: len(file.entries([f"{valve}/identifier"], 0, 2**63 - 1)) for valve in valves}
 
 
 def _live(options: argparse.Namespace, seconds: float, ledger: Ledger) -> Iterator[Row]:
-    """Run the plant for some seconds; account for what has happened."""
+    """Run the plant for some seconds, and account for all events."""
     disk = options.folder / "disk"
     history = disk / "history.sqlite"
     with small_disk(disk) as is_small, own_database() as database:
@@ -194,7 +194,7 @@ def _live(options: argparse.Namespace, seconds: float, ledger: Ledger) -> Iterat
 
 
 def _pass(month: _Month, plant: Plant) -> None:
-    """Let the month go by; then end all processes, and note what they held."""
+    """Let the month pass, then end all processes; note memory and sample counts."""
     lasting = plant.processes[-1]
 
     def note_memory(share: float) -> None:

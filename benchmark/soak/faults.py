@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""What happens to a plant: each fault goes on by a step whenever it is asked to."""
+"""Faults of a plant, as generators that advance step by step."""
 
 import itertools
 import random
@@ -21,26 +21,26 @@ from benchmark.soak.feed import Feed, Nonsense
 from benchmark.soak.plant import Database, Life, Plant, Process, filled
 
 _PATIENCE = 60.0
-"""Time, s, in which what was sent must be accounted for."""
+"""Time limit, s, to account for sent samples."""
 _HOUR = 3600 * 10**9
 
 
 @dataclass
 class Site:
-    """What faults act on.
+    """The objects that faults act on.
 
     Attributes
     ----------
     feeds : mapping of str to Feed
-        Feed of each valve that works through the month.
+        Feeds of the valves that work through the month.
     of_now : str
-        Valve whose sensors speak by the clock of now.
+        Valve whose sensors stamp with the present time.
     disk : Path or None
         Folder of the history, if its disk is small.
     nonsense : Nonsense or None
-        What the sensors of the valve of now say wrong.
+        Present nonsense from the sensors of `of_now`.
     silent : set of str
-        Valves whose sensors say nothing.
+        Valves with silent sensors.
     """
 
     plant: Plant
@@ -54,7 +54,7 @@ class Site:
     silent: set[str] = field(default_factory=set)
 
     def mortal(self) -> Process:
-        """Choose a process that may be ended: the last one lives through the month."""
+        """Choose a process that may be ended; the last process lasts the whole month."""
         return self.chance.choice(self.plant.processes[:-1])
 
 
@@ -71,13 +71,13 @@ def _until(met: Callable[[], bool], seconds: float = _PATIENCE) -> Iterator[None
 
 
 def settled(process: Process) -> Iterator[None]:
-    """Send nothing, until all that was sent is accounted for and all calls are answered."""
+    """Hold back samples until all are accounted for and all calls are answered."""
     process.is_held = True
     yield from _until(lambda: process.life.is_settled and not process.life.calls)
 
 
 def restart(site: Site) -> Iterator[None]:
-    """End a process as launch and systemd do, and start it again."""
+    """End a process as launch and systemd do, and restart it."""
     process = site.mortal()
     if process.is_held:
         return
@@ -88,7 +88,7 @@ def restart(site: Site) -> Iterator[None]:
 
 
 def kill(site: Site) -> Iterator[None]:
-    """Kill a process at a random instant, in the midst of samples and calls."""
+    """Kill a process at a random instant, with samples and calls under way."""
     yield from _for(site.chance.uniform(0.0, 2.0))
     process = site.mortal()
     if process.is_held:
@@ -101,7 +101,7 @@ def kill(site: Site) -> Iterator[None]:
 
 
 def clock_step(site: Site) -> Iterator[None]:
-    """Let the clock of a valve's sensors be wrong by up to two hours, and be set right again."""
+    """Set the clock of a valve's sensors wrong by up to two hours, and correct it later."""
     feed = site.feeds[site.chance.choice([*site.feeds])]
     feed.clock_error = round(site.chance.uniform(-2.0, 2.0) * _HOUR)
     yield from _for(site.chance.uniform(5.0, 20.0))
@@ -109,7 +109,7 @@ def clock_step(site: Site) -> Iterator[None]:
 
 
 def silent_sensor(site: Site) -> Iterator[None]:
-    """Let the sensors of a valve be silent until the node says so."""
+    """Silence the sensors of a valve until the node reports it."""
     valve = site.chance.choice([*site.feeds])
     process = site.plant.process_of(valve)
     if valve in site.silent or process.is_held:
@@ -124,15 +124,15 @@ def silent_sensor(site: Site) -> Iterator[None]:
 
 
 def bad_samples(site: Site) -> Iterator[None]:
-    """Let a pressure sensor say what is no number."""
+    """Let a pressure sensor send nan."""
     site.feeds[site.chance.choice([*site.feeds])].bad_rows = site.chance.randint(1, 40)
     yield
 
 
 def nonsense(site: Site) -> Iterator[None]:
-    """Let the sensors of a valve say nonsense until the node says so, then the truth again.
+    """Let the sensors of a valve send nonsense until the node reports it, then the truth again.
 
-    The kinds take turns. What a process does not live through is not counted.
+    The kinds take turns. A case in which the process ends is not counted.
     """
     valve, process = site.of_now, site.plant.process_of(site.of_now)
     if site.nonsense is not None or not site.plant.is_ready(valve):
@@ -152,7 +152,7 @@ def nonsense(site: Site) -> Iterator[None]:
 
 
 def frozen(site: Site) -> Iterator[None]:
-    """Stop a process for some seconds, as a machine that swaps does."""
+    """Suspend a process for some seconds, like a machine that swaps."""
     process = site.plant.processes[-1]
     if process.is_held:
         return
@@ -166,7 +166,7 @@ def frozen(site: Site) -> Iterator[None]:
 def _until_told(
     site: Site, event: str, tells: Callable[[Life], bool], longer: float
 ) -> Iterator[None]:
-    """Wait until a process tells of a fault, and up to `longer` s more; note both."""
+    """Wait until a process reports a fault, and up to `longer` s more; log the result."""
     told: set[str] = set()
 
     def is_told() -> bool:
@@ -188,7 +188,7 @@ def _tells_of_database(life: Life) -> bool:
 
 
 def full_disk(site: Site) -> Iterator[None]:
-    """Fill the disk of the history until a node says so; then there is room again."""
+    """Fill the disk of the history until a node reports it, then make room again."""
     if site.disk is None:
         return
     with filled(site.disk):
@@ -196,7 +196,7 @@ def full_disk(site: Site) -> Iterator[None]:
 
 
 def database_killed(site: Site) -> Iterator[None]:
-    """Kill the server of the history with all its processes, and start it again."""
+    """Kill the history server with all its processes, and restart it."""
     database = site.database
     if database is None or database.is_away:
         return
@@ -208,7 +208,7 @@ def database_killed(site: Site) -> Iterator[None]:
 
 
 def database_silent(site: Site) -> Iterator[None]:
-    """Let the server of the history take packets and answer none, as a cut network does."""
+    """Let the history server accept packets without answering, like a cut network."""
     database = site.database
     if database is None or database.is_away:
         return
@@ -230,4 +230,4 @@ FAULTS: Mapping[str, tuple[Callable[[Site], Iterator[None]], float]] = {
     "database killed": (database_killed, 1.0),
     "database silent": (database_silent, 1.0),
 }
-"""Faults by their names, each with its weight when the next one is drawn."""
+"""Faults by name, each with its weight in the draw."""

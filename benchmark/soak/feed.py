@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""What the sensors of valves say: the records of one, a piece at a time, or nonsense."""
+"""Sensor data of valves: records, a piece at a time, or nonsense."""
 
 import math
 from collections.abc import Iterator
@@ -31,17 +31,17 @@ from valve_friction_ros.model import (
 from valve_friction_ros.nodes.plumbing.messages import time_message
 
 PIECE = 50
-"""Rows that are sent at once."""
+"""Rows per piece, sent at once."""
 
 _ROWS, _RATE = 500, 100.0
-"""Rows of a record, and rows a second of the valve's time."""
+"""Rows per record, and rows per second of the valve's time."""
 _STEPS = 20
-"""Steps in which the friction grows over the month."""
+"""Number of steps in which friction grows over the month."""
 
 PERIOD = 0.05
-"""Time from one nonsensical sample to the next, s."""
+"""Sample period of nonsense, s."""
 TOLD_WITHIN = 5.0
-"""Time, s, within which nonsense must be told."""
+"""Time limit, s, for a node to report nonsense."""
 
 _BAR, _MM = 1e5, 1e-3
 _SECOND = 10**9
@@ -49,7 +49,7 @@ _FAR = 3 * 10**8 * _SECOND
 
 
 class Piece(NamedTuple):
-    """Rows that are sent at once: stamps, ns, and what the sensors say, Pa and m."""
+    """Rows sent at once: stamps, ns, and measured values, Pa and m."""
 
     stamps: NDArray[np.int64]
     pressure: NDArray[np.float64]
@@ -58,7 +58,7 @@ class Piece(NamedTuple):
 
 @lru_cache
 def _record(growth: float) -> Recording:
-    """Return five seconds of a valve whose friction has grown by a factor."""
+    """Return five seconds of a valve with friction grown by a factor."""
     time = np.arange(_ROWS) / _RATE
     friction = replace(
         LOW_FRICTION,
@@ -71,17 +71,17 @@ def _record(growth: float) -> Recording:
 
 
 class Feed:
-    """Records of one valve, whose friction grows over the month by a factor."""
+    """Records of one valve with friction that grows over the month by a factor."""
 
     def __init__(self, growth: float) -> None:
         self._growth = growth
         self.clock_error = 0
-        """How far the clock of the sensors is ahead, ns."""
+        """Time by which the sensors' clock is ahead, ns."""
         self.bad_rows = 0
-        """Rows of the next record whose pressure is not a number."""
+        """Number of rows in the next record with a pressure of nan."""
 
     def record(self, share: float, now: int) -> Iterator[Piece]:
-        """Yield a record at a share of the month, that begins at a time (ns)."""
+        """Yield a record for a share of the month, starting at a time, ns."""
         step = round(share * _STEPS) / _STEPS
         record = _record(1.0 + (self._growth - 1.0) * step)
         period = round(1e9 / _RATE)
@@ -95,7 +95,7 @@ class Feed:
 
 
 def stamped(stamp: int, pressure: float, position: float) -> tuple[FluidPressure, JointState]:
-    """Return what both sensors say at a time, ns."""
+    """Return the messages of both sensors at a time, ns."""
     drive = FluidPressure(fluid_pressure=pressure)
     stem = JointState(name=["stem"], position=[position])
     drive.header.stamp = stem.header.stamp = time_message(stamp)
@@ -103,7 +103,7 @@ def stamped(stamp: int, pressure: float, position: float) -> tuple[FluidPressure
 
 
 class Nonsense(Enum):
-    """What is wrong, with words that the node must find for it."""
+    """Kinds of nonsense, with the words expected from the node."""
 
     WRONG_JOINT = "no position for the joint 'stem'"
     PRESSURE_NAN = "actuator_pressure: 100 % of its samples are rejected"
@@ -119,7 +119,7 @@ class Nonsense(Enum):
 
 
 def said(kind: Nonsense | None, now: int) -> tuple[FluidPressure, JointState]:
-    """Return what both sensors say at a time, ns; None: the truth."""
+    """Return the messages of both sensors at a time, ns; None for the truth."""
     phase = 2 * math.pi * (now / _SECOND % 8.0) / 8.0
     pressure = {
         Nonsense.PRESSURE_NAN: math.nan,

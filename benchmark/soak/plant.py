@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The processes of the plant and what they stand on, what was sent to each, and what they told."""
+"""The processes of the plant with disk and database, their samples and their reports."""
 
 import contextlib
 import signal
@@ -42,17 +42,17 @@ _CHUNK = 2**16
 
 
 class Kept(NamedTuple):
-    """What a history file and a server hold at the end.
+    """Contents of a history file and a server at the end.
 
     Attributes
     ----------
     in_file, on_server : int
-        Identifications, counted by the engines' own clients.
+        Identifications, counted by the clients of the database engines.
     waiting : int
-        Rows that wait in the file for the server, as it counts them: what a process writes as it
-        ends is sent at its next start.
+        Rows in the file that wait for the server, by the file's own count; rows that a process
+        writes as it ends are sent at its next start.
     lacking : int
-        Rows of all tables that the server lacked, or had otherwise, as a comparison finds them.
+        Rows of all tables that were missing or different on the server.
     """
 
     in_file: int
@@ -62,17 +62,17 @@ class Kept(NamedTuple):
 
 
 class Database:
-    """A database on a server that may be ended and held."""
+    """A database on a server that may be killed and suspended."""
 
     def __init__(self, server: PostgresServer) -> None:
         self.server = server
         self._name = server.database()
         self.url = server.url(self._name)
         self.is_away = False
-        """Whether a fault has it now."""
+        """Whether a fault affects it now."""
 
     def compared_with(self, file: Path) -> Kept:
-        """Return what a file and the server hold; then the server holds everything."""
+        """Compare a file with the server; afterwards the server has everything."""
         ((on_server,),) = self.server.do(self._name, _COUNT)
         with contextlib.closing(sqlite3.connect(file)) as connection:
             (in_file,) = connection.execute(_COUNT).fetchone()
@@ -84,14 +84,14 @@ class Database:
 
 @contextlib.contextmanager
 def own_database() -> Iterator[Database | None]:
-    """Provide a new database on a new server; None where no server can be started."""
+    """Provide a new database on a new server, or None if no server can be started."""
     with running_server() as server:
         yield None if server is None else Database(server)
 
 
 @contextlib.contextmanager
 def small_disk(folder: Path) -> Iterator[bool]:
-    """Mount a file system of 64 MB in memory on a folder; tell whether that was allowed."""
+    """Mount a 64 MB file system in memory on a folder; provide whether that was allowed."""
     folder.mkdir(parents=True, exist_ok=True)
     command = ["mount", "-t", "tmpfs", "-o", f"size={_SIZE}", "tmpfs", str(folder)]
     is_mounted = False
@@ -106,7 +106,7 @@ def small_disk(folder: Path) -> Iterator[bool]:
 
 @contextlib.contextmanager
 def filled(folder: Path) -> Iterator[None]:
-    """Leave no room on the disk of a folder."""
+    """Fill the disk of a folder."""
     filler = folder / f"filler_{uuid.uuid4().hex}"  # two faults may fill it at once
     with contextlib.suppress(OSError), filler.open("wb", buffering=0) as stream:
         while True:
@@ -118,26 +118,26 @@ def filled(folder: Path) -> Iterator[None]:
 
 
 _CALL_LIMIT = 120.0
-"""Time, s, after which a call will not be answered any more."""
+"""Time, s, after which a call is considered unanswered."""
 SERVICES = ("identify", "set_baseline", "save", "report")
 
 
 @dataclass
 class Life:
-    """A process from its start to its end.
+    """A process from start to end.
 
     Attributes
     ----------
     begin : float
-        When it was started, s since 1970.
+        Start time, s since 1970.
     sent : Counter
-        Samples sent to each of its valves; bad ones among them.
+        Samples sent to each of its valves, including bad samples.
     told, messages : dict
         Values and message of the latest diagnostic of each valve.
     calls : dict
-        Calls under way: valve, service and begin by their future.
+        Calls under way: valve, service and start time by future.
     unsaved : int
-        Identifications answered since a valve last told that its history is written.
+        Identifications answered since a valve last reported that its history is written.
     """
 
     process: processes.Process
@@ -149,12 +149,12 @@ class Life:
     unsaved: int = 0
 
     def told_samples(self, valve: str, which: str) -> int:
-        """Return how many samples of a valve were ``taken``, or ``rejected`` with a cause."""
+        """Return the number of samples of a valve ``taken``, or ``rejected`` with a cause."""
         return int(self.told.get(valve, {}).get(f"samples_{which}", "0"))
 
     @property
     def is_settled(self) -> bool:
-        """Whether each sample that was sent is accounted for."""
+        """Whether every sent sample is accounted for."""
         return all(
             self.told_samples(valve, "taken") + self.told_samples(valve, "rejected") == count
             for valve, count in self.sent.items()
@@ -162,7 +162,7 @@ class Life:
 
 
 class Process:
-    """One process of the plant with its valves, by their namespaces, over all its lives."""
+    """One process of the plant with the namespaces of its valves, over all restarts."""
 
     def __init__(
         self, name: str, folder: Path, valves: Sequence[str], command: Sequence[str]
@@ -170,16 +170,16 @@ class Process:
         self.name, self.valves = name, valves
         self._command, self._log = command, folder / f"{name}.log"
         self.is_held = False
-        """Whether nothing is to be sent to it now."""
+        """Whether to hold back samples and calls for now."""
         self.begin()
 
     def begin(self) -> None:
-        """Start it, or start it anew."""
+        """Start or restart the process."""
         self.life = Life(processes.Process(self._command, self._log), time.time())
 
 
 class Plant(Participant):
-    """All processes, and a node that feeds, asks and hears them."""
+    """All processes, and a node that feeds, calls and hears them."""
 
     def __init__(self, ledger: Ledger, plant: Sequence[Process]) -> None:
         self.ledger, self.processes = ledger, plant
@@ -202,11 +202,11 @@ class Plant(Participant):
         }
 
     def process_of(self, valve: str) -> Process:
-        """Return the process that watches a valve."""
+        """Return the process that monitors a valve."""
         return self._by_valve[valve]
 
     def spin(self, seconds: float) -> None:
-        """Hear what comes within some time, and note calls that have ended."""
+        """Listen for some time, and note finished calls."""
         super().spin(seconds)
         for process in self.processes:
             for call in list(process.life.calls):
@@ -242,7 +242,7 @@ class Plant(Participant):
                 life.unsaved = 0
 
     def is_ready(self, valve: str) -> bool:
-        """Whether a valve is heard, and hears."""
+        """Whether a valve publishes and has subscribed."""
         process = self._by_valve[valve]
         if process.is_held or valve not in process.life.told:
             return False
@@ -252,7 +252,7 @@ class Plant(Participant):
         return all(one.get_subscription_count() for one in publishers)
 
     def send(self, valve: str, piece: Piece) -> None:
-        """Send rows as single samples, or as a block to a process of many valves."""
+        """Send rows as single samples or, to a process of many valves, as a block."""
         process = self._by_valve[valve]
         rows = len(piece.stamps)
         if len(process.valves) == 1:
@@ -271,7 +271,7 @@ class Plant(Participant):
         process.life.sent[valve] += 2 * rows
 
     def say(self, valve: str, kind: Nonsense | None) -> None:
-        """Send what both sensors of a valve say now: nonsense of a kind, or the truth."""
+        """Send the present samples of both sensors of a valve: nonsense, or the truth."""
         self._publish(valve, said(kind, time.time_ns()))
 
     def _publish(self, valve: str, messages: tuple[FluidPressure, JointState]) -> None:
@@ -280,14 +280,14 @@ class Plant(Participant):
         self._by_valve[valve].life.sent[valve] += len(messages)
 
     def ask(self, valve: str, service: str) -> None:
-        """Call a service of a valve, if it is there."""
+        """Call a service of a valve, if available."""
         client, process = self._clients[valve, service], self._by_valve[valve]
         if client.service_is_ready() and not process.is_held:
             call = client.call_async(Trigger.Request())
             process.life.calls[call] = valve, service, time.monotonic()
 
     def end_life(self, process: Process, how: signal.Signals) -> None:
-        """End a process, and note what its life has taken."""
+        """End a process, and note its sample counts."""
         life = process.life
         if how is signal.SIGKILL:
             life.process.kill()
@@ -298,9 +298,9 @@ class Plant(Participant):
         self.note_end(process, how.name)
 
     def note_end(self, process: Process, how: str) -> None:
-        """Write down what was sent to a life that has ended, and what it has told of it.
+        """Log the samples sent to an ended process, and its own counts of them.
 
-        The calls under way will not be answered.
+        Calls under way will not be answered.
         """
         life = process.life
         for valve, service, _ in life.calls.values():

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The ledger as rows with their goals."""
+"""The ledger as rows with goals."""
 
 from collections import Counter
 from collections.abc import Iterator, Mapping
@@ -20,9 +20,9 @@ from benchmark.soak.plant import Kept
 
 _KILLED = "SIGKILL"
 _BUSY = "already running"
-"""Words of a refusal that looks at no record, so that nothing is stored."""
+"""Words of a refusal without a record, so that nothing is stored."""
 _MIDDLE, _GROWTH = 0.5, 1.05
-"""Memory at the end over that in the middle, of the process that lives through the month."""
+"""Middle of the month, and limit of the final over the middle memory, of the lasting process."""
 
 
 def _samples(lives: Events) -> Iterator[Row]:
@@ -67,7 +67,7 @@ def _identifications(calls: Events, lives: Events, stored: Mapping[str, int]) ->
 
 
 def _memory(looks: Events) -> Iterator[Row]:
-    """Compare the end with the middle, when each part of the package has been used once."""
+    """Compare the end with the middle, by which time every part of the package has been used."""
     by_share = {one["share"]: one["megabytes"] for one in looks}
     for share, size in by_share.items():
         item = f"memory after {100 * share:.0f} % of the month"
@@ -79,7 +79,7 @@ def _memory(looks: Events) -> Iterator[Row]:
 
 
 def _nonsense(begun: Events, ended: Events) -> Iterator[Row]:
-    """Account for the nonsense of sensors: each is told, and over, within a time."""
+    """Check that each kind of nonsense is reported, and cleared, within the time limit."""
     yield Row("kinds of nonsense that sensors said", len({one["name"] for one in begun}), "of 11")
     for item, events in (("told", begun), ("over", ended)):
         late = [one for one in events if not (one["told"] and one["seconds"] <= TOLD_WITHIN)]
@@ -90,7 +90,7 @@ def _nonsense(begun: Events, ended: Events) -> Iterator[Row]:
 
 
 def rows(events: Events, stored: Mapping[str, int]) -> Iterator[Row]:
-    """Account for all that happened; `stored` are the identifications in the history, by valve."""
+    """Account for all events; `stored` is the number of identifications in the history by valve."""
     of = by_kind(events)
     faults = Counter(one["name"] for one in of["fault"])
     for name, count in sorted(faults.items()):
@@ -118,11 +118,11 @@ def rows(events: Events, stored: Mapping[str, int]) -> Iterator[Row]:
 
 
 def database_rows(kept: Kept) -> Iterator[Row]:
-    """Yield what the file and the server of the history hold at the end."""
+    """Yield the final contents of history file and server."""
     yield Row("identifications in the file", kept.in_file)
     is_same = kept.on_server == kept.in_file
     yield Row("identifications on the server", kept.on_server, "", goal="as many", met=is_same)
     yield Row("rows that wait for the next start", kept.waiting)
-    # One that was sent may wait still, until the node has heard that it arrived.
+    # A sent row may still wait, until the node knows that it has arrived.
     lost = max(kept.lacking - kept.waiting, 0)
     yield none("rows that the server lacks and that do not wait", lost)

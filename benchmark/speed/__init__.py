@@ -7,4 +7,4 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""What identification costs, each item beside its peers: `make bench`."""
+"""Cost of identification, with peers for comparison: `make bench`."""

@@ -44,7 +44,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the parts that were asked for; return 1 if a goal is missed."""
+    """Run the requested parts; return 1 if a goal is missed."""
     parser = _parser()
     options = parser.parse_args(arguments)
     if not options.output.parent.is_dir():

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""What the parts measure on, 62.4 s of the bench at 1 kHz; how thoroughly, and by which clock."""
+"""Records for the parts, 62.4 s of the bench at 1 kHz; number of repeats, and the clock."""
 
 import resource
 import statistics
@@ -41,15 +41,15 @@ VALVES = {"low": LOW_FRICTION, "high": HIGH_FRICTION}
 """Parameters of the bench valve by the tightness of its packing."""
 
 PRESSURES = ("square", "sine", "noisy square")
-"""Names that `pressure` knows."""
+"""Names for `pressure`."""
 
 _NOISE = 165.0
-"""Noise of the pressure that makes a sliding stem stick and slip at every other sample, Pa."""
+"""Pressure noise that makes a sliding stem stick and slip at every other sample, Pa."""
 
 
 @cache
 def pressure(name: str, samples: int = SAMPLES) -> NDArray[np.float64]:
-    """Return an actuator pressure behind the converter's lag, Pa, shape (samples,)."""
+    """Return an actuator pressure after the converter lag, Pa, shape (samples,)."""
     wave = SineWave() if name == "sine" else SquareWave()
     answer = converter_response(wave.sample(np.arange(samples) * PERIOD), PERIOD)
     if name.startswith("noisy"):
@@ -61,7 +61,7 @@ def pressure(name: str, samples: int = SAMPLES) -> NDArray[np.float64]:
 def noisy_record(
     parameters: KarnoppParameters, noise: SensorNoise, samples: int = SAMPLES
 ) -> Recording:
-    """Return a record of the square wave as noisy sensors see it."""
+    """Return a record of the square wave with sensor noise."""
     driving = pressure("square", samples)
     stem = simulate(BENCH_VALVE, parameters, driving, PERIOD)
     return noise.applied_to(Recording(PERIOD, driving, stem.position))
@@ -69,16 +69,16 @@ def noisy_record(
 
 @dataclass(frozen=True)
 class Settings:
-    """How thoroughly the parts measure.
+    """Settings of the measurements.
 
     Attributes
     ----------
     repeats : int
-        Repetitions of each measurement, of which the median counts.
+        Repetitions of each measurement; the result is their median.
     seconds : float
-        How long each stream runs, s.
+        Duration of each stream, s.
     say : callable
-        Shows what is being done now.
+        Shows the present activity.
     """
 
     repeats: int = 5
@@ -87,7 +87,7 @@ class Settings:
 
 
 def _processor_time() -> float:
-    """Return the seconds that this process and its ended children have spent."""
+    """Return the processor time of this process and its ended children, s."""
     children = resource.getrusage(resource.RUSAGE_CHILDREN)
     return time.process_time() + children.ru_utime + children.ru_stime
 
@@ -95,8 +95,8 @@ def _processor_time() -> float:
 def medians(functions: Mapping[str, Callable[[], object]], repeats: int) -> dict[str, float]:
     """Return the median processor time of each function, s.
 
-    They take turns, so that a change of the machine's speed strikes all of them. Each runs once
-    beforehand, unmeasured: compilation and caches are no part of what is compared.
+    The functions take turns, so that a change of the machine's speed affects all. Each first runs
+    once unmeasured, to exclude compilation and caching.
     """
     seconds: dict[str, list[float]] = {name: [] for name in functions}
     for function in functions.values():

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""An observer of the identifiers: what they say, how soon they answer, and what they take."""
+"""An observer of identifiers: their diagnostics, response times and resource use."""
 
 import os
 import time
@@ -24,19 +24,19 @@ from benchmark.harness.run import Participant
 PROFILE = "FASTRTPS_DEFAULT_PROFILES_FILE"
 _PATIENCE = 120.0
 _SETTLING = 0.5
-"""Time, s, after which a service that was found has met its client, too."""
+"""Time, s, for a discovered service to discover its client too."""
 _SILENCE = 5.0
-"""Time without new samples after which no more are expected, s."""
+"""Time without new samples, s, after which no more are expected."""
 
 
 def identifier(name: str, valve: str, window: float) -> Process:
-    """Start the identifier of a valve, by the name of its module."""
+    """Start the identifier of a valve by its module name."""
     given = parameters(history_file="''", window=f"{window:.1f}")
     return Process(module(name, "--ros-args", "-r", f"__ns:=/{valve}", *given))
 
 
 def fleet(valves: Sequence[str], window: float) -> Process:
-    """Start the identifiers of some valves in one process, which brings its own profile."""
+    """Start the identifiers of several valves in one process, which has its own profile."""
     given = parameters(history_file="''", window=f"{window:.1f}", valves=f"[{','.join(valves)}]")
     others = {name: value for name, value in os.environ.items() if name != PROFILE}
     command = module("valve_friction_ros.nodes.identifiers", "--ros-args", *given)
@@ -44,9 +44,9 @@ def fleet(valves: Sequence[str], window: float) -> Process:
 
 
 class Observer(Participant):
-    """Listens to the diagnostics of the identifiers, and calls them.
+    """Listens to the diagnostics of identifiers, and calls their services.
 
-    One that does not listen is no slower where there are hundreds of valves.
+    Without listening, hundreds of valves do not slow it down.
     """
 
     def __init__(self, listens: bool = True) -> None:
@@ -63,13 +63,13 @@ class Observer(Participant):
             valve = status.hardware_id
             self.first_seen.setdefault(valve, time.monotonic())
             values = {entry.key: entry.value for entry in status.values}
-            if "buffered_samples" in values:  # of a valve whose process keeps up
+            if "buffered_samples" in values:  # only if its process keeps up
                 self.buffered[valve] = int(values["buffered_samples"])
 
     def wait_for(self, valves: Sequence[str], process: Process, buffered: int = 0) -> bool:
-        """Listen until all valves hold `buffered` samples, or no more come; return whether all do.
+        """Listen until all valves hold `buffered` samples or no more arrive; return whether all do.
 
-        They are patiently waited for until the first diagnostics and the first samples.
+        The first diagnostics and the first samples may take longer.
         """
         most, end = 0, time.monotonic() + _PATIENCE
         while time.monotonic() < end:
@@ -83,18 +83,18 @@ class Observer(Participant):
         return False
 
     def wait_for_answer(self, valve: str) -> float:
-        """Ask a valve's identifier until it answers; return the time of its answer, s."""
+        """Call a valve's identifier until it answers; return the time of the answer, s."""
         client = self.node.create_client(Trigger, f"/{valve}/identifier/clear")
         end = time.monotonic() + _PATIENCE
         while time.monotonic() < end:
-            # A node that has not met its client yet answers it in vain, so it is asked again.
+            # The answer is lost if the node has not discovered its client yet, so call again.
             if client.service_is_ready() and self.answer(client.call_async(Trigger.Request()), 0.3):
                 return time.monotonic()
             self.spin(0.02)
         raise TimeoutError(f"/{valve}/identifier does not answer")
 
     def meet(self, valve: str, service: str) -> Client:
-        """Find a service of a valve, so that a call of it takes no longer than its answer."""
+        """Discover a service of a valve, so that a later call includes no discovery time."""
         name = f"/{valve}/identifier/{service}"
         if name not in self._clients:
             self._clients[name] = self.node.create_client(Trigger, name)
@@ -103,15 +103,15 @@ class Observer(Participant):
         return self._clients[name]
 
     def ask(self, valve: str, service: str) -> Future:
-        """Call a service of a valve; return what becomes its answer."""
+        """Call a service of a valve; return the future of its answer."""
         return self.meet(valve, service).call_async(Trigger.Request())
 
     def told(self, valve: str, service: str) -> Trigger.Response | None:
-        """Call a service of a valve, and listen until it has answered; None if it does not."""
+        """Call a service of a valve and listen until it answers; return None without an answer."""
         return self.answer(self.ask(valve, service), _PATIENCE)
 
     def cost(self, process: Process, seconds: float) -> float:
-        """Listen for a while; return the cores that a process uses meanwhile."""
+        """Listen for a while; return the cores used by a process meanwhile."""
         before = process.usage()
         self.spin(seconds)
         return process.usage().cores_since(before)

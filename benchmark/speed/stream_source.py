@@ -34,7 +34,7 @@ _SECOND = 1_000_000_000
 _START = 1_700_000_000
 """Stamp of the first sample, s."""
 _TURN = 1e-3
-"""Time between two looks at what is due, s."""
+"""Time between two checks for due samples, s."""
 _PATIENCE = 300.0
 _DEPTH = 20_000
 _STAMP = struct.Struct("<iI")
@@ -44,7 +44,7 @@ _BLOCKS_PER_SECOND = 10
 
 
 def _signals(rate: int) -> tuple[np.ndarray, np.ndarray]:
-    """Ten seconds of a slow sine of the bench valve with sensor noise, to be repeated."""
+    """Return ten seconds of a slow sine of the bench valve with sensor noise, to repeat."""
     pressure = model.SineWave(period=5.0).sample(np.arange(10 * rate) / rate)
     stem = model.simulate(model.BENCH_VALVE, model.LOW_FRICTION, pressure, 1 / rate)
     noisy = model.SensorNoise(position=10e-6, pressure=100.0, seed=1).applied_to(
@@ -54,7 +54,7 @@ def _signals(rate: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _sender(publisher: Publisher, message: object) -> Callable[[int, float], None]:
-    """Return a function of stamp (ns) and value that publishes `message`, marked by its value."""
+    """Return a function that publishes `message` with a given stamp, ns, and value."""
     raw = bytearray(serialize_message(message))
     at = raw.index(_NUMBER.pack(_MARK))
 
@@ -67,7 +67,7 @@ def _sender(publisher: Publisher, message: object) -> Callable[[int, float], Non
 
 
 def _due(rate: float, count: int) -> Iterator[range]:
-    """Yield the numbers of the samples that have become due, until `count` have."""
+    """Yield the numbers of due samples, up to `count`."""
     begin, sent = time.monotonic(), 0
     while sent < count:
         due = min(count, int((time.monotonic() - begin) * rate) + 1)
@@ -125,7 +125,7 @@ def _publish_blocks(node: Node, valves: list[str], rate: int, count: int) -> Non
     table = np.frombuffer(raw, np.float64, 3 * size, at).reshape(size, 3)
     pressure, position = _signals(rate)
     _wait_for_readers(publishers)
-    # The valves take turns, as they would come from a data-acquisition system.
+    # The valves take turns, as from a data-acquisition system.
     for due in _due(_BLOCKS_PER_SECOND * len(valves), count // size * len(valves)):
         for number in due:
             first = number // len(valves) * size
@@ -145,7 +145,7 @@ def _wait_for_readers(publishers: list[Publisher]) -> None:
 
 
 def main() -> int:
-    """Publish, then wait until the benchmark has read what arrived."""
+    """Publish, then wait until the benchmark has read the buffers."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("valves", nargs="+")
     parser.add_argument("--rate", type=int, default=1000)

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The identifier as it is written first: typed subscriptions, and rclpy's default executor."""
+"""The identifier in its obvious form: typed subscriptions and rclpy's default executor."""
 
 import sys
 from collections.abc import Callable
@@ -27,7 +27,7 @@ from valve_friction_ros.streams import RecordBuffer
 
 
 class TypedInputs:
-    """Both topics, each message deserialised by rclpy and taken for itself."""
+    """Both topics, with each message deserialised by rclpy and processed separately."""
 
     def __init__(self, node: Node, joint: str, hand_on: Callable, _: Callable) -> None:
         self._buffer: RecordBuffer = hand_on.__self__._monitor.buffer  # noqa: SLF001
@@ -54,28 +54,28 @@ class TypedInputs:
 
     @property
     def names(self) -> StreamNames:
-        """The topics, fully resolved, and the joint."""
+        """Fully resolved topics, and the joint."""
         return StreamNames(*(watch.topic for watch in self._watches), self._joint)
 
     def follow_publishers(self) -> None:
         """Do nothing: the publishers of the benchmark are reliable."""
 
     def take(self, is_all: bool = False) -> None:
-        """Do nothing: every message has been taken."""
+        """Do nothing: every message has been processed."""
 
     def values(self) -> dict[str, str]:
         """Return nothing: samples are not counted."""
         return {}
 
     def problems(self, timeout: float) -> list[str]:
-        """Say what is wrong with the inputs."""
+        """Return the problems of the inputs."""
         return [told for watch in self._watches if (told := watch.problem(timeout))]
 
 
 def main() -> int:
-    """Run the node in the default executor until it is interrupted."""
+    """Run the node in the default executor until interrupted."""
     identifier.ValveInputs = TypedInputs
-    for create in ("create_publisher", "create_subscription"):  # with its callbacks for events
+    for create in ("create_publisher", "create_subscription"):  # with their event callbacks
         setattr(identifier.Identifier, create, getattr(Node, create))
     rclpy.init()
     with running_workers() as workers:

@@ -7,8 +7,8 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The parts of the speed benchmark: a module each, found by its name.
+"""The parts of the speed benchmark: one module each, found by name.
 
 A part is a module with a docstring, whose first line is its title, and a function
-``measure(settings: Settings) -> Iterable[Row]`` that yields a row as soon as it is measured.
+``measure(settings: Settings) -> Iterable[Row]`` that yields each row as soon as it is measured.
 """

@@ -9,8 +9,8 @@
 
 """Many recordings on the workers of a Dask cluster, beside the processes of one machine.
 
-The recordings and the clock are those of the part `fleet`. Needs the extra `cluster`, and as many
-free cores as there are workers.
+Recordings and clock are the same as in the part `fleet`. This part needs the extra `cluster`, and
+as many free cores as workers.
 """
 
 import statistics
@@ -31,7 +31,7 @@ _OVERHEAD, _GAIN = 1.15, 1.8
 
 @contextmanager
 def _cluster(workers: int) -> Iterator[Cluster]:
-    """Start a scheduler and workers of one thread each, and connect to it."""
+    """Start a scheduler and single-threaded workers, and connect to the scheduler."""
     from distributed import LocalCluster  # noqa: PLC0415 - an extra
 
     with (
@@ -43,7 +43,7 @@ def _cluster(workers: int) -> Iterator[Cluster]:
 
 
 def measure(settings: Settings) -> Iterator[Row]:
-    """Measure one worker and two, each in turn with as many processes."""
+    """Measure one and two workers, in turn with as many processes."""
     pool: dict[int, list[Cost]] = {count: [] for count in _WORKERS}
     workers: dict[int, list[Cost]] = {count: [] for count in _WORKERS}
     with tempfile.TemporaryDirectory() as folder:

@@ -9,10 +9,10 @@
 
 """Many recordings on all cores: CSV files of 62.4 s at 1 kHz, read and identified.
 
-Wall-clock seconds a recording in the steady state: begun when as many answers are there as there
-are processes, so that their start does not count. Other work on the machine takes cores away from
-several processes and not from one; processor seconds a recording tell whether the processes are in
-each other's way.
+The result is wall-clock seconds per recording in steady state. The measurement begins after as many
+answers as there are processes, to exclude their start. Other work on the machine takes cores away
+from several processes but not from a single process. Processor seconds per recording show whether
+the processes disturb each other.
 """
 
 import os
@@ -45,7 +45,7 @@ _SHARE = 0.8
 
 
 def write_recordings(folder: Path) -> list[Path]:
-    """Write the records that take turns as recordings."""
+    """Write the recordings, which are used in turn."""
     paths = []
     for seed in range(_FILES):
         record = noisy_record(HIGH_FRICTION, SensorNoise(10e-6, 100.0, seed))
@@ -58,7 +58,7 @@ def write_recordings(folder: Path) -> list[Path]:
 
 
 class _Answer(NamedTuple):
-    """When a recording was finished, s since 1970, and by whom."""
+    """End time of a recording, s since 1970, with its process, processor time and error."""
 
     ended: float
     process: int
@@ -67,7 +67,7 @@ class _Answer(NamedTuple):
 
 
 class Cost(NamedTuple):
-    """Seconds a recording."""
+    """Seconds per recording."""
 
     wall: float
     processor: float
@@ -80,7 +80,7 @@ def timed(job: Job) -> _Answer:
 
 
 def recordings(paths: Sequence[Path], processes: int) -> list[Job]:
-    """Return what so many processes shall do: the recordings in turn."""
+    """Return the jobs for a number of processes: the recordings in turn."""
     options = Options(BENCH_VALVE, ReadingOptions(), DEFAULT_METHOD, IdentificationSettings())
     count = processes * (_RECORDINGS_A_PROCESS + 1)
     turns = (paths[number % len(paths)] for number in range(count))
@@ -88,7 +88,7 @@ def recordings(paths: Sequence[Path], processes: int) -> list[Job]:
 
 
 def cost_of(answers: Iterable[tuple[Job, _Answer | DeadWorker]], processes: int) -> Cost:
-    """Return what a recording costs so many processes, once each has given an answer."""
+    """Return the cost per recording for a number of processes, once each has answered."""
     ends: list[float] = []
     processor_times: dict[int, list[float]] = {}
     for _, answer in answers:
@@ -96,7 +96,7 @@ def cost_of(answers: Iterable[tuple[Job, _Answer | DeadWorker]], processes: int)
             raise RuntimeError(f"a recording was not identified: {answer}")
         ends.append(answer.ended)
         processor_times.setdefault(answer.process, []).append(answer.processor_time)
-    over = time.time()  # with all answers; they may come several at once
+    over = time.time()  # after all answers, which may arrive several at once
     return Cost(
         (over - sorted(ends)[processes - 1]) / (len(ends) - processes),
         sum(times[-1] - times[0] for times in processor_times.values())
@@ -105,7 +105,7 @@ def cost_of(answers: Iterable[tuple[Job, _Answer | DeadWorker]], processes: int)
 
 
 def measure(settings: Settings) -> Iterator[Row]:
-    """Measure one process and one on each core, in turn."""
+    """Measure one process, and one process per core, in turn."""
     cores = usable_cores()
     costs: dict[int, list[Cost]] = {1: [], cores: []}
     with tempfile.TemporaryDirectory() as folder:

@@ -28,27 +28,27 @@ _RECORDS = {
     "1 kHz, 10 µm / 100 Pa": (1, SensorNoise(10e-6, 100.0, 1)),
     "1 kHz, 28.6 µm / 165 Pa": (1, SensorNoise(28.6e-6, 165.0, 1)),
 }
-"""Of the samples at 1 kHz one in so many, and the noise of both sensors."""
+"""Stride over the samples at 1 kHz, and noise of both sensors."""
 
 _WARM, _MOST = 0.3, 2.0
-"""Processor time, s: of a minute at 100 Hz and of an ideal one of a Karnopp valve, and of any."""
+"""Goals of processor time, s: a Karnopp valve at 100 Hz or without noise, and any other record."""
 
 _EXAMPLES = Path(__file__).parents[3] / "examples"
 _COMMANDS = {
     "identify one_minute.csv": (["one_minute.csv", "--valve", "fv_101.yaml"], 1.0),
     "identify --help": (["--help"], 0.2),
 }
-"""Arguments of a command, and its goal, s."""
+"""Arguments of each command, and its goal, s."""
 
 
 def _tried(do: Callable[[Recording, Valve], object], one: Recording, valve: Valve) -> None:
-    """Identify, or be refused; both take their time."""
+    """Identify a record; a refusal is measured as well."""
     with contextlib.suppress(RefusalError):
         do(one, valve)
 
 
 def measure(settings: Settings) -> Iterator[Row]:
-    """Measure the default method beside the published one, then the command."""
+    """Measure the default method against the published method, then the command."""
     for name, plant in PLANTS.items():
         driving = pressure("square", SAMPLES)
         clean = Recording(PERIOD, driving, plant.respond(driving, PERIOD))

@@ -9,8 +9,8 @@
 
 """Hundreds of valves in one process: start, memory, cost and answers.
 
-The peer of 500 valves is five times what 100 valves take, so a ratio below one is growth beyond
-proportion.
+The peer of 500 valves is five times the cost of 100 valves, so a ratio below one means
+disproportionate growth.
 """
 
 import time
@@ -33,7 +33,7 @@ class _Found(NamedTuple):
 
 
 def _found(count: int, settings: Settings) -> _Found:
-    """Stream to some valves for longer than a window; ask one while others identify."""
+    """Stream to the valves for longer than a window; call one valve while others identify."""
     settings.say(f"{count} valves, 1 kHz in blocks of 100")
     valves = [f"fv_{number}" for number in range(count)]
     answers = [0.0]
@@ -46,7 +46,7 @@ def _found(count: int, settings: Settings) -> _Found:
             working = [client.ask(valve, "identify") for valve in valves[:_IDENTIFIED]]
             while not all(one.done() for one in working):
                 begin = time.monotonic()
-                client.told(valves[-1], "restore_baseline")  # refused, at once
+                client.told(valves[-1], "restore_baseline")  # refused immediately
                 answers.append(time.monotonic() - begin)
                 client.spin(0.1)
 
@@ -71,6 +71,6 @@ def _rows(few: _Found, many: _Found) -> Iterable[Row]:
 
 
 def measure(settings: Settings) -> Iterable[Row]:
-    """Measure a process of 100 valves and one of 500."""
+    """Measure a process of 100 valves and a process of 500."""
     few, many = (_found(count, settings) for count in (_FEW, _MANY))
     return _rows(few, many)

@@ -23,10 +23,10 @@ from benchmark.speed.measuring import PERIOD, PRESSURES, VALVES, Settings, media
 from valve_friction_ros.model import BENCH_VALVE, KarnoppParameters, Valve, balanced_state, simulate
 
 _ACCURACY = 1e-9
-"""Largest error of the position that a peer may make, m: about ours, 0.4 nm."""
+"""Largest position error of a peer, m: of the order of ours, 0.4 nm."""
 
 _PEER_SAMPLES = {"square": slice(10_400), "sine": slice(10_400), "noisy square": slice(5200, 5600)}
-"""Samples that the peers simulate: a period of the square wave, or 0.4 s of it, sliding."""
+"""Samples for the peers: a period of the square wave, or 0.4 s of sliding."""
 
 _TOLERANCES = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
 _SUBSTEPS = (100, 1000, 3000, 10_000, 30_000)
@@ -45,11 +45,11 @@ def ivp(
     method: str,
     tolerance: float,
 ) -> Floats:
-    """Simulate by `solve_ivp` from rest, a call for each slide, ended by an event where it stops.
+    """Simulate with `solve_ivp` from rest, one call per slide, which ends by an event at rest.
 
-    The stuck phases cost nothing but a search for the first sample that breaks the stem loose. The
-    stem must not reach a stop, and F_s must be F_c. The tolerance is relative; the absolute one is
-    this share of 10 mm and 10 mm/s.
+    A stuck phase costs only a search for the sample at which the stem breaks away. The stem must
+    not reach a travel stop, and F_s must equal F_c. `tolerance` is relative; the absolute tolerance
+    is the same share of 10 mm and 10 mm/s.
     """
     mass, spring = parameters.mass, parameters.spring_constant
     coulomb, viscous = parameters.coulomb_friction, parameters.viscous_friction
@@ -146,7 +146,7 @@ def euler(
     period: float,
     substeps: int,
 ) -> Floats:
-    """Simulate (1) and (2) by Euler's method with `substeps` steps a sample, compiled."""
+    """Simulate (1) and (2) by a compiled Euler method with `substeps` steps per sample."""
     return _euler(
         valve.actuator_force(pressure) - parameters.spring_preload,
         period,
@@ -162,7 +162,7 @@ def euler(
 
 @numba.njit(cache=True)
 def bare_recursion(forces: Floats) -> tuple[Floats, Floats]:
-    """Step a linear second-order system by a force that is linear between samples, and no more."""
+    """Step a linear second-order system under a force that is linear between samples."""
     positions, velocities = np.empty_like(forces), np.empty_like(forces)
     position, velocity = 0.0, 0.0
     positions[0], velocities[0] = position, velocity
@@ -190,7 +190,7 @@ def _loosest(
 
 
 def _ladders(parameters: KarnoppParameters) -> Iterator[list[tuple[str, Simulation]]]:
-    """Yield each peer in settings from the loosest to the strictest."""
+    """Yield each peer with settings from the loosest to the strictest."""
     for method in ("LSODA", "Radau"):
         yield [
             (

@@ -9,8 +9,8 @@
 
 """The streams: an identifier as a process, fed over DDS.
 
-Costs are processor seconds of all threads of the process in a second of streaming, told as cores.
-A stream has lost nothing if the identifier's buffer holds every sample that was published.
+Costs are processor seconds of all threads of the process per second of streaming, given as cores. A
+stream has lost nothing if the identifier's buffer holds every published sample.
 """
 
 import statistics
@@ -34,13 +34,13 @@ _VALVE = "fv_1"
 _VALVES = [f"fv_{number}" for number in range(100)]
 _SETTLING = 3.0
 _CHILD_ENDS = 12.0
-"""Time, s, after which the process that has identified has ended."""
+"""Time, s, after which the child process of an identification has ended."""
 _LONGEST_REPEAT = 20.0
 _UNIT = "cores"
 
 
 class Outcome(NamedTuple):
-    """What a stream did to the process that took it."""
+    """Effect of a stream on the receiving process."""
 
     idle: float
     busy: float
@@ -60,7 +60,7 @@ def _peer(window: float) -> Process:
 
 
 def _source(valves: Sequence[str], rate: int, seconds: float, *options: str) -> Process:
-    """Start what streams to some valves."""
+    """Start the source of the streams for several valves."""
     stream = ("--rate", str(rate), "--seconds", str(seconds), *options)
     return Process(module("benchmark.speed.stream_source", *valves, *stream))
 
@@ -73,7 +73,7 @@ def fed(
     options: Sequence[str] = (),
     meanwhile: Callable[[Observer], object] = lambda _: None,
 ) -> Outcome:
-    """Start identifiers, stream for `seconds`, and count what arrived."""
+    """Start identifiers, stream for `seconds`, and count the samples that arrive."""
     with Observer() as listener, start(2 * seconds + 60) as process:
         if not listener.wait_for(valves, process):
             raise RuntimeError("the identifiers do not publish their diagnostics")
@@ -120,7 +120,7 @@ def _start(settings: Settings) -> Iterator[Row]:
 
 
 def _memory_of_a_node(settings: Settings) -> Iterator[Row]:
-    """Fill a window of 60 s at 1 kHz; identify it, and write reports on it."""
+    """Fill a window of 60 s at 1 kHz, identify it, and write reports."""
     settings.say("memory with a full window")
     reports = 20
     with Observer() as listener, _ours(60.0) as process:

@@ -29,7 +29,7 @@ from valve_friction_ros.signals import differentiate
 Floats = NDArray[np.float64]
 
 _ENOUGH = 200
-"""Samples above a threshold from which on both sweeps are compared."""
+"""Minimum number of samples above a threshold for a comparison of both sweeps."""
 
 _TIMES_FASTER = 100
 _AGREEMENT = 1e-7
@@ -38,10 +38,10 @@ _AGREEMENT = 1e-7
 def plain_sweep(
     columns: Floats, force: Floats, speed: Floats, thresholds: Floats
 ) -> tuple[Floats, Floats, Floats]:
-    """Solve (7) by `numpy.linalg.lstsq` above each threshold δv(s), with (17) and (18).
+    """Solve (7) with `numpy.linalg.lstsq` above each threshold δv(s), with (17) and (18).
 
-    The regressors (5) have shape (n, p), the estimates (S, p); all are nan where no more samples
-    than regressors are left.
+    The regressors (5) have shape (n, p), and the estimates (S, p). All results are nan where too
+    few samples remain for the regressors.
     """
     free = columns.shape[1]
     estimates = np.full((thresholds.size, free), np.nan)
@@ -62,10 +62,11 @@ def plain_sweep(
 def incremental_sweep(
     columns: Floats, force: Floats, speed: Floats, thresholds: Floats
 ) -> tuple[Floats, Floats, Floats]:
-    """Do the same by `numpy.linalg.qr`: from one threshold to the next only new rows are taken in.
+    """Do the same with `numpy.linalg.qr`, adding only the new rows at each threshold.
 
-    The triangular factor of the rows above a threshold, and the rows between it and the next lower
-    one, have the triangular factor of all rows above that. Parameters and result as `plain_sweep`.
+    The triangular factor of the rows above a threshold, stacked on the rows between it and the next
+    lower threshold, gives the triangular factor of all rows above the latter. Parameters and result
+    are those of `plain_sweep`.
     """
     free = columns.shape[1]
     estimates = np.full((thresholds.size, free), np.nan)
@@ -91,7 +92,7 @@ def incremental_sweep(
 
 @numba.njit
 def _read_through(columns: Floats) -> float:
-    """Add up all columns: what merely reading them costs."""
+    """Add up all columns, to measure the cost of merely reading them."""
     total = 0.0
     for row in range(columns.shape[0]):
         for column in range(columns.shape[1]):
@@ -114,7 +115,7 @@ def _thresholds(regression: ForceBalanceRegression, steps: int) -> Floats:
 
 
 def _largest_difference(regression: ForceBalanceRegression) -> float:
-    """Largest relative difference of the estimates from those of the plain sweep."""
+    """Return the largest relative difference between the estimates of both sweeps."""
     thresholds = _thresholds(regression, 330)
     ours = sweep_thresholds(regression, thresholds)
     plain, *_ = plain_sweep(regression.columns, regression.force, regression.speed, thresholds)
@@ -126,7 +127,7 @@ def _largest_difference(regression: ForceBalanceRegression) -> float:
 
 
 def measure(settings: Settings) -> Iterator[Row]:
-    """Measure the sweep against the plain one, against reading the columns, and as it grows."""
+    """Measure the sweep against its peers, against reading the columns, and with growing size."""
     for name in VALVES:
         regression, double = _regression(name, 62_400), _regression(name, 124_800)
         thresholds, few = _thresholds(regression, 330), _thresholds(regression, 33)
