@@ -329,7 +329,7 @@ def _every(truth: Truth, seconds: float) -> Truth:
 
 
 def ignition_chart(truth: Truth, random: Random) -> Export:
-    """Whole seconds: every sample of a slow valve."""
+    """Times in whole seconds, from a slow recorder."""
     truth = _every(truth, 1.0)
     pressure, position, coarse = _signals(truth, "kPa", "%")
     zone = _one_of(random, "CEST", "UTC")

@@ -7,4 +7,4 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""What the harnesses share: processes, a participant, a run in a domain of its own, rows."""
+"""Common parts of the benchmarks: processes, a participant, a run in a private domain, rows."""
