@@ -337,7 +337,7 @@ def test_text_from_outside_is_text():
     page = Cells(page_text([evil, row("x", None, error=EVIL)], EVIL))
     lines = [line for line in page.rows if line]
     assert lines[0][2].strip() == f"{EVIL}{EVIL}"  # the tag, and below it the recording
-    assert [line[-1] for line in lines] == [EVIL, EVIL]
+    assert [line[-1] for line in lines] == [EVIL, f"about x; {EVIL}"]
     assert page.scripts == 1
     assert page.links == ["plant_reports/a%20b%26%3C.html"]
 
