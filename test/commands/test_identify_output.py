@@ -340,7 +340,7 @@ class TestOptions:
         (lambda c: c["position_m"].fill(0.01), "the stem did not move: its position spans 0 µm"),
         (lambda c: c["position_m"].put(range(50, 150), math.nan), "row 52, column 'position_m': "),
         (lambda c: c["time_s"].put(50, 0.48), "row 52, column 'time_s' goes back (0.48 s after 0"),
-        (lambda c: c["pressure_pa"].put(50, 250000.5), "row 52, column 'pressure_pa': 250000 Pa "),
+        (lambda c: c["pressure_pa"].put(50, 260000.0), "row 52, column 'pressure_pa': 260000 Pa "),
         (lambda c: c.pop("time_s"), "cannot tell which column is the time, of position_m, "),
         (lambda c: c.update(position_m=1e3 * c["position_m"]), "the stem position runs from 3.691"),
         (lambda c: c.update(position_m=0.028 - c["position_m"]), "the stem moves against the pres"),

@@ -236,7 +236,7 @@ class TestUnitsAndLayout:
         path = write([HEADER, *rows(TIME, POSITION, np.linspace(100, 300, 40))])
         form = Columns(pressure_unit="kPa")
         assert refused(path, form=form).startswith(
-            "row 32, column 'pressure_pa': 253.846 kPa is outside the sensor's range 0 to 250000 Pa"
+            "row 33, column 'pressure_pa': 258.974 kPa is outside the sensor's range 0 to 250000 Pa"
         )
 
     @pytest.mark.parametrize(
@@ -429,9 +429,10 @@ class TestEntries:
 
     @pytest.mark.parametrize(
         ("pressure", "inside"),
-        [(0.0, True), (250000.0, True), (math.nextafter(0, -1), False), (250000.1, False)],
+        [(-3125.0, True), (257812.5, True), (-3125.1, False), (257812.6, False)],
     )
     def test_range_of_the_sensor(self, write, pressure, inside):
+        """With what NAMUR NE 43 reserves beyond it: 3.8 to 20.5 mA, −1/80 and +1/32 of the span."""
         path = write(with_row(12, f"0.01,0.003,{pressure!r}"))
         if inside:
             assert read_csv(path, BENCH_VALVE).pressure[10] == pressure

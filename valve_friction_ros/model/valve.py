@@ -19,6 +19,9 @@ from numpy.typing import ArrayLike, NDArray
 from valve_friction_ros.model.checks import require_finite, require_non_negative, require_positive
 from valve_friction_ros.model.drive import Drive
 
+_BELOW, _ABOVE = (4.0 - 3.8) / 16.0, (20.5 - 20.0) / 16.0
+"""Shares of its range by which a sensor reads beyond it: 3.8 to 20.5 mA by NAMUR NE 43."""
+
 _Samples = TypeVar("_Samples", float, NDArray[np.float64])
 
 
@@ -37,7 +40,8 @@ class Valve:
     travel : float
         The stem moves between stops at 0 and at `travel`, m. Infinity: no stops.
     pressure_minimum, pressure_maximum : float
-        Range of the pressure sensor, Pa. A reading outside is a fault of the sensor.
+        Range of the pressure sensor, Pa. A reading clearly outside is a fault of the sensor
+        (`readings`).
 
     Raises
     ------
@@ -93,9 +97,22 @@ class Valve:
             return force
         return force / self.diaphragm_area + self.pressure_reference
 
+    @property
+    def readings(self) -> tuple[float, float]:
+        """Lowest and highest pressure that a sound sensor may read, Pa.
+
+        A transmitter reads beyond its range by as much as NAMUR NE 43 reserves for measured values:
+        a vented actuator may read slightly below zero.
+        """
+        span = self.pressure_maximum - self.pressure_minimum
+        if not math.isfinite(span):
+            return self.pressure_minimum, self.pressure_maximum
+        return self.pressure_minimum - _BELOW * span, self.pressure_maximum + _ABOVE * span
+
     def sensor_reads(self, pressure: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Return for each `pressure` in Pa whether it lies within the range of the sensor."""
-        return (pressure >= self.pressure_minimum) & (pressure <= self.pressure_maximum)
+        """Return for each `pressure` in Pa whether a sound sensor may read it."""
+        lowest, highest = self.readings
+        return (pressure >= lowest) & (pressure <= highest)
 
     def share_of_travel(self, distance: float) -> float:
         """Express `distance` in m as a share of the travel, nan for a machine without stops."""

@@ -239,7 +239,7 @@ class RecordBuffer:
         the methods above, because the samples that a clearing leaves depend on their order.
         """
         pressure, position = arrivals.samples(Kind.PRESSURE), arrivals.samples(Kind.POSITION)
-        lowest, highest = self._valve.pressure_minimum, self._valve.pressure_maximum
+        lowest, highest = self._valve.readings
         if not (
             pressure.stamps.size + position.stamps.size == arrivals.stamps.size
             and _are_good(self._pressure.last_stamp, pressure)
@@ -294,7 +294,10 @@ class RecordBuffer:
             return self._reject(stamp, signal, fault)
         lowest, highest = self.bounds(signal)
         if not lowest <= value <= highest:
-            whose = Code.SENSOR_RANGE if signal is Signal.PRESSURE else Code.ANY_VALVE_RANGE
+            whose = Code.ANY_VALVE_RANGE
+            if signal is Signal.PRESSURE:
+                whose = Code.SENSOR_RANGE
+                lowest, highest = self._valve.pressure_minimum, self._valve.pressure_maximum
             span = said(whose, lowest=lowest, highest=highest)
             return self._reject(stamp, signal, SampleFault.OUT_OF_RANGE, span=span)
         buffer.append(stamp, value)
@@ -305,7 +308,7 @@ class RecordBuffer:
     def bounds(self, signal: Signal) -> tuple[float, float]:
         """Return the lowest and the highest reading that is taken, Pa or m."""
         if signal is Signal.PRESSURE:
-            return self._valve.pressure_minimum, self._valve.pressure_maximum
+            return self._valve.readings
         return -MOST_POSITION, MOST_POSITION
 
     def _reject(
