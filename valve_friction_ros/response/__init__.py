@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The answer of a stem to its command in service: moves, deviation, hunting, blame; no ROS."""
+"""Response of a stem to its command in service: moves, deviation, hunting, causes; no ROS."""
 
 from typing import TYPE_CHECKING
 

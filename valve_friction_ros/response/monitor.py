@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The answers of one valve in service: from samples to moves."""
+"""Responses of one valve in service: from samples to moves."""
 
 import math
 from collections import deque
@@ -31,35 +31,35 @@ from valve_friction_ros.streams.samples import SampleBuffer
 _SECOND = 1_000_000_000
 
 _TICK = 10_000_000
-"""Least time between two samples that are kept, ns."""
+"""Least time between two kept samples, ns."""
 
 _SLOW_TICK = 100_000_000
-"""Of those that hunting and deviation are looked for in, ns."""
+"""Least time between two samples kept for hunting and deviation, ns."""
 
 _LONGEST = 60.0
-"""Time, s, after which a move is over that has not settled."""
+"""Time, s, after which a move ends even if it has not settled."""
 
 _SHORTEST = 1.0
-"""Time, s, for which the command must stand still before and after a step."""
+"""Time, s, for which the command must be constant before and after a step."""
 
 _ANSWER_TIME = 10.0
-"""Time, s, after which a stem that rests under a pressure that rests has ignored a step."""
+"""Time, s, after which a stem that rests under a constant pressure has ignored a step."""
 
 _FIRST_LOOK, _LOOKS = 2.0, 1.25
-"""When it is first looked whether the stem has settled, s after the step, and how much later each
-time."""
+"""Time of the first check whether the stem has settled, s after the step; and the factor from the
+time of one check to the next."""
 
 _HUNTING_WINDOW, _HUNTING_PERIOD = 300.0, 5.0
-"""Time that hunting is looked for in, and how often, s."""
+"""Window that is searched for hunting, and interval between searches, s."""
 
 _MOST_AHEAD = 10_000
-"""Samples of the command that wait for the stem's; then the oldest are dropped."""
+"""Command samples that may wait for stem samples; beyond it the oldest are dropped."""
 
 _AHEAD, _BEHIND = 10.0, 60.0
-"""Time, s, by which no clock of a command is ahead of that of the stem, or behind it."""
+"""Lead and lag of the command over the stem, s, beyond which their clocks disagree."""
 
 _RECENT = 200
-"""Moves that count."""
+"""Number of latest moves that are kept."""
 
 _HOUR = 3600
 
@@ -72,7 +72,7 @@ class ResponseMonitor:
     travel : float
         Travel of the stem, m; finite.
     earlier : sequence of StepAnswer
-        Moves from before, oldest first; the latest count.
+        Earlier moves, oldest first; only the latest are kept.
     """
 
     def __init__(self, travel: float, earlier: Sequence[StepAnswer] = ()) -> None:
@@ -86,7 +86,7 @@ class ResponseMonitor:
         self.forget()
 
     def forget(self) -> None:
-        """Drop the samples, as when a clock goes back; moves are kept."""
+        """Drop the samples, for example when a clock goes back; keep the moves."""
         self._holds = CommandHolds(self._travel)
         self._ahead: deque[tuple[int, float]] = deque(maxlen=_MOST_AHEAD)
         self._fast = {kind: SampleBuffer(_LONGEST + 5.0) for kind in _SIGNALS}
@@ -105,37 +105,38 @@ class ResponseMonitor:
 
     @property
     def has_command(self) -> bool:
-        """Whether a command has come."""
+        """Whether a command has arrived."""
         return math.isfinite(self._command)
 
     @property
     def clock_offset(self) -> float:
-        """Time, s, that the latest command is ahead of the stem; below zero: behind; 0: neither.
+        """Lead of the latest command over the stem, s; negative for a lag, 0 if small.
 
-        A command more than 10 s ahead waits, and one more than 60 s behind finds no samples.
+        A command more than 10 s ahead waits. A command more than 60 s behind finds no samples.
         """
         return self._offset
 
     @property
     def hunting(self) -> Hunting | None:
-        """A limit cycle that goes on."""
+        """The present limit cycle, or None."""
         return self._hunting
 
     @property
     def summary(self) -> ResponseSummary:
-        """The latest 200 moves."""
+        """Summary of the latest 200 moves."""
         return self._summary
 
     def drain(self) -> tuple[StepAnswer, ...]:
-        """Return the moves that have ended since the last call, the latest 200."""
+        """Return the moves that ended since the last call, at most the latest 200."""
         ended = tuple(self._ended)
         self._ended.clear()
         return ended
 
     def deviation(self) -> tuple[Spread, float]:
-        """Return mean and 95 % quantile in time of the magnitude, and the mean with its sign.
+        """Return the deviation over the last hour of samples: its magnitude and its signed mean.
 
-        Of command less position, over the last hour of samples, share of the travel.
+        The deviation is command minus position, as a share of the travel. The spread holds the mean
+        (as its median) and the 95 % quantile in time.
         """
         if not self._away:
             return Spread.of(()), math.nan
@@ -144,7 +145,7 @@ class ResponseMonitor:
         return Spread(mean, float(np.min(sizes)), high, sizes.size), float(np.mean(signed))
 
     def take(self, command: Samples, arrivals: Arrivals) -> None:
-        """Take a command, m, and samples of pressure and stem, which came in the same time."""
+        """Take samples of the command, m, and those of pressure and stem from the same time."""
         if self._goes_back(command, arrivals):
             self.forget()
         before = self._fast[Kind.POSITION].last_stamp
@@ -162,7 +163,7 @@ class ResponseMonitor:
             self._look(newest)
 
     def _compare_clocks(self, command: Samples, before: int | None, newest: int | None) -> None:
-        """Note whether the latest command is far ahead of the stem, or behind it."""
+        """Note whether the latest command is far ahead of the stem, or far behind it."""
         if newest is None or not (command.stamps.size or self._offset > 0):
             return
         last = self._ahead[-1][0] if self._ahead else newest
@@ -173,7 +174,7 @@ class ResponseMonitor:
         self._offset = ahead if ahead > _AHEAD else -behind if behind > _BEHIND else 0.0
 
     def _taken_command(self, newest: int | None) -> list[CommandStep]:
-        """Take the command up to the newest sample of the stem; what is ahead of it waits."""
+        """Take the command up to the newest sample of the stem; later commands wait."""
         due: list[tuple[int, float]] = []
         while newest is not None and self._ahead and self._ahead[0][0] <= newest:
             due.append(self._ahead.popleft())
@@ -222,7 +223,7 @@ class ResponseMonitor:
             self._second.append((self._command - value) / self._travel)
 
     def _follow(self, change: CommandStep) -> None:
-        """End the move under way, and begin another one."""
+        """End the present move, and begin the next."""
         self._end(change.stamp)
         self._steady_since, self._hunting = change.stamp, None
         if change.is_step and change.held >= _SHORTEST:
@@ -249,7 +250,7 @@ class ResponseMonitor:
         return evaluated(change, stem, pressure, end, self._travel)
 
     def _look(self, newest: int) -> None:
-        """See whether the move under way has settled, and whether the stem hunts."""
+        """Check whether the present move has settled, and whether the stem hunts."""
         change = self._change
         if change is not None and newest >= self._look_at:
             elapsed = (newest - change.stamp) / 1e9
@@ -267,7 +268,7 @@ class ResponseMonitor:
 
 
 def _first_of_ticks(stamps: NDArray[np.int64], tick: int, last: int | None) -> NDArray[np.bool_]:
-    """Return which samples are the first of their tick, ns, and of a later one than the last."""
+    """Return which samples are the first of their tick, ns, and in a later tick than `last`."""
     ticks = stamps // tick
     return np.diff(ticks, prepend=-1 if last is None else last // tick) > 0
 

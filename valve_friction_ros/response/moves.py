@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""What a stem does after its command in service: moves after steps, and hunting between them."""
+"""Response of a stem in service: moves after steps of the command, and hunting between steps."""
 
 import math
 from collections import deque
@@ -23,37 +23,37 @@ from valve_friction_ros.signals import position_noise, quantisation_step
 from valve_friction_ros.streams import Samples
 
 _SAME_COMMAND = 1e-3
-"""Share of the travel within which a command still holds. Chosen: a tenth of the dead band of a
+"""Largest variation of a held command, share of the travel. Chosen: a tenth of the dead band of a
 good valve (1 %)."""
 
 _GATE = 6.0
-"""Standard deviations of the noise beyond which a sample has left its hold."""
+"""Standard deviations of the noise beyond which a sample has left the held value."""
 
 _TRANSIT = 0.1
 """Longest time of a jump, s. Chosen: the cycle of a fast controller."""
 
 _JUMP_SHARE = 0.7
-"""Share of the change that lies between two samples in a jump; in a ramp it is spread."""
+"""Least share of the change that a jump makes between two samples; a ramp spreads its change."""
 
 _NOISE_SAMPLES, _FEWEST_NOISE_SAMPLES, _LONGEST_PERIOD = 256, 32, 0.5
-"""Samples that the noise is estimated from, their least number, and their longest period, s."""
+"""Samples in the estimate of the noise, their least number, and their longest period, s."""
 
 _Transit = tuple[int, float, float, float]
 
 
 class CommandStep(NamedTuple):
-    """A change of the command, as soon as it has reached its next value.
+    """A change of the command, given once the command has reached its next value.
 
     Attributes
     ----------
     stamp : int
-        When it began, ns.
+        Start of the change, ns.
     before, after : float
         The command before and after, in the unit of the samples.
     held : float
-        Time for which it stood still before, s.
+        Time for which the command was constant before, s.
     is_step : bool
-        Whether it jumped; a ramp is no step.
+        Whether the command jumped; False for a ramp.
     """
 
     stamp: int
@@ -66,8 +66,8 @@ class CommandStep(NamedTuple):
 class CommandHolds:
     """Finds the changes of a command that holds its value until the next sample.
 
-    So it may be published at each cycle or only when it changes. Its noise is estimated, and does
-    not count as a change.
+    The command may be published at each cycle or only when it changes. Its noise is estimated, and
+    is not taken for a change.
     """
 
     def __init__(self, travel: float) -> None:
@@ -81,7 +81,7 @@ class CommandHolds:
         self._transit: _Transit | None = None
 
     def take(self, samples: Samples) -> list[CommandStep]:
-        """Take samples, in the order of their stamps; return the changes that they end."""
+        """Take samples in the order of their stamps; return the changes that they complete."""
         if not samples.stamps.size:
             return []
         self._recent.extend(zip(*(part.tolist() for part in samples), strict=True))
@@ -95,7 +95,7 @@ class CommandHolds:
         return found
 
     def _noise(self) -> float:
-        """Estimate the noise; a command that comes only when it changes has none."""
+        """Estimate the noise; zero for a command that is published only when it changes."""
         stamps, values = (np.array(part) for part in zip(*self._recent, strict=True))
         if (
             values.size < _FEWEST_NOISE_SAMPLES
@@ -106,7 +106,7 @@ class CommandHolds:
         return position_noise(values)
 
     def advance(self, stamp: int) -> list[CommandStep]:
-        """Note that no sample has come until `stamp`, ns; return the change that this ends."""
+        """Note that no sample arrived before `stamp`, ns; return the change that this completes."""
         if self._transit is None or (stamp - self._transit[0]) / 1e9 < _TRANSIT:
             return []
         start, before, held, last = self._transit
@@ -132,21 +132,21 @@ _PERIOD = 0.01
 """Least time between two points of the grid, s."""
 
 _BEFORE = 0.5
-"""Time before the step that gives the steady values, s."""
+"""Time before the step over which the steady values are averaged, s."""
 
 _VISIBLE = 1e-3
-"""Share of the travel above which a movement counts. Chosen: a tenth of the dead band of a good
+"""Share of the travel above which the stem has moved. Chosen: a tenth of the dead band of a good
 valve (1 %), above the creep of a stem before it breaks away."""
 
 
 _COARSEST = 5e-3
-"""Share of the travel of the coarsest step of a converter: 8 bits."""
+"""Coarsest step of a converter, share of the travel: 8 bits."""
 
 _PRESSURE_SHARE = 0.02
-"""Share of the pressure's largest change of a move at which it has begun to answer."""
+"""Share of its largest change in a move at which the pressure has begun to respond."""
 
 _TAIL = 0.4
-"""Share of the time since the step, at its end, that is quiet once the stem has settled."""
+"""Final share of the time since the step that must be quiet for a settled stem."""
 
 _T86 = -math.expm1(-2.0)
 
@@ -155,43 +155,44 @@ _Values = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class StepAnswer:
-    """The answer of stem and actuator to a step of the command.
+    """Response of stem and actuator to a step of the command.
 
-    Positions are shares of the travel; times are since the step, s, nan where they are not known.
+    Positions are shares of the travel. Times are in s after the step, nan where unknown.
 
     Attributes
     ----------
     stamp : int
         Stamp of the step, ns.
     change : float
-        CommandStep of the command.
+        Signed size of the step.
     held : float
-        Time until it settled, or the next command came.
+        Time until the stem settled or the next command came.
     moved : bool
         Whether the stem moved.
     settled : bool
         Whether stem and pressure came to rest.
     dead_time, t63, t86, overshoot : float
-        As `StepMetrics` has them, of a stem that rested before; all but the dead time need one
-        that settled.
+        As in `StepMetrics`, for a stem that rested before the step; all but the dead time also
+        need a settled stem.
     steady_error : float
-        Command less position of the settled stem.
+        Command minus position of the settled stem.
     deviation, high_deviation : float
-        Mean, and 95th percentile in time, of the magnitude of command less position.
+        Mean and 95th percentile in time of the magnitude of command minus position.
     pressure_delay : float
-        Until the pressure began to change the way of the command; nan if it never did.
+        Time until the pressure began to change in the direction of the command; nan if it never
+        did.
     pressure_t86 : float
-        Until the pressure had 86.5 % of its change between the first movement of the stem and the
-        end.
+        Time until the pressure had made 86.5 % of its change from the first movement of the stem to
+        the end.
     push : float
-        Change of the pressure, the way of the command, until the stem first moved; where it did
-        not, the largest; Pa.
+        Change of the pressure in the direction of the command until the stem first moved, Pa; the
+        largest change if the stem did not move.
     pressure, position : float
-        Means over the end, Pa and share of the travel.
+        Means over the final part, Pa and share of the travel.
     rested, pressure_rested : bool
-        Whether the stem, and the pressure, rested before the step.
+        Whether the stem and the pressure rested before the step.
     at_stop : bool
-        Whether it began or ended at a stop, where the pressure says nothing of friction.
+        Whether the move began or ended at a stop, where the pressure shows no friction.
     """
 
     stamp: int
@@ -217,24 +218,24 @@ class StepAnswer:
 
 
 _AT_STOP = 0.02
-"""Share of the travel within which the stem is at a stop. Chosen: above the error of a position."""
+"""Share of the travel within which the stem is at a stop. Chosen: above the position error."""
 
 
 def stem_noise(position: _Values) -> float:
-    """Estimate the noise of a position, share of the travel, with the rounding of a converter.
+    """Estimate the noise of a position, share of the travel, including converter rounding.
 
-    Two levels of a stem that jumps are no codes of a converter, so that its step is bounded.
+    The converter step is bounded: two levels of a jumping stem may look like two of its codes.
     """
     step = min(quantisation_step(position), _COARSEST)
     return math.hypot(position_noise(position), step / math.sqrt(12.0))
 
 
 def is_quiet(values: _Values, least: float) -> bool:
-    """Return whether a signal stays within `least`, or within its noise, of one value."""
+    """Return whether a signal is constant to within `least` or its noise."""
     if values.size < 2:
         return False
     band = max(least, 2 * _GATE * position_noise(values))
-    # Thirds, because noise alone hides a slow drift.
+    # Compare thirds: the noise hides a slow drift in the range of the whole.
     thirds = [float(np.mean(part)) for part in np.array_split(values, 3) if part.size]
     return float(np.ptp(values)) <= band and max(thirds) - min(thirds) <= max(least, band / 4)
 
@@ -255,14 +256,14 @@ def evaluated(
     stem, pressure : Samples
         Position, m, and pressure, Pa, from before the step on.
     end : int
-        When it settled, or the next command came, ns.
+        When the stem settled or the next command came, ns.
     travel : float
-        m.
+        Travel, m.
 
     Returns
     -------
     StepAnswer or None
-        None where the signals do not cover the step.
+        None if the signals do not cover the step.
     """
     before = change.stamp - round(min(_BEFORE, change.held / 2) * 1e9)
     covered = all(s.stamps.size and s.stamps[0] <= before for s in (stem, pressure))
@@ -330,44 +331,44 @@ def _measured(
 
 
 _LEAST_SWING = 3e-3
-"""Share of the travel of the smallest swing that counts."""
+"""Smallest swing of a limit cycle, share of the travel."""
 
 _SWING_GATE = 8.0
-"""Standard deviations of the noise of the smallest swing."""
+"""Smallest swing, in standard deviations of the noise."""
 
 _SWINGS = 5
-"""Swings, half periods, that hunting needs, the latest ones."""
+"""Latest swings (half periods) that hunting needs."""
 
 _REGULAR_SWINGS = 2.5
-"""Longest over shortest of them, and largest over smallest, of one limit cycle."""
+"""Largest ratio between periods, and between swings, of one limit cycle."""
 
 _ENDED_SWINGS = 2.0
-"""Longest half periods without a turn after which it is over."""
+"""Time without a turn that ends a limit cycle, over its longest half period."""
 
 _NEAR_END = 0.1
-"""Share of a swing at either end that counts as resting there: a sine is there for 0.41 of the
-time, a triangle for 0.2, a square for all of it."""
+"""Share of a swing, at either end, in which a signal is near that end. A sine spends 0.41 of the
+time there, a triangle 0.2, a square all of it."""
 
 _DRIVEN_SHARE = 0.25
-"""Share of a swing by which the command itself may swing with it: noise hides it where it is small,
-so that the command seems to stand still."""
+"""Largest swing of the command, as a share of the swing of the stem. Noise may hide a small swing,
+so that the command seems constant."""
 
 _SQUARE, _SWINGING = 0.7, 0.5
 
 
 @dataclass(frozen=True)
 class Hunting:
-    """A limit cycle at a command that stands still.
+    """A limit cycle at a constant command.
 
     Attributes
     ----------
     period : float
-        s.
+        Period, s.
     amplitude : float
-        From end to end, share of the travel.
+        Peak to peak, share of the travel.
     sticks : bool
-        Whether the stem rests at both ends and jumps while the pressure swings on: stiction, and
-        integral action of the positioner. False: it cannot be told.
+        Whether the stem rests at both ends and jumps while the pressure keeps changing: stiction
+        with integral action of the positioner. False if this cannot be determined.
     """
 
     period: float
@@ -376,7 +377,7 @@ class Hunting:
 
 
 def _turns(values: _Values, gate: float) -> list[int]:
-    """Return the samples of the extremes that lie at least `gate` from the one before."""
+    """Return the samples of the extremes that differ by more than `gate` from the previous one."""
     turns: list[int] = []
     low = high = 0
     way = 0
@@ -397,7 +398,7 @@ def _turns(values: _Values, gate: float) -> list[int]:
 
 
 def _crossing(values: _Values, turn: int, following: int) -> int:
-    """Return the sample at which a swing passes its middle; ends are blurred by noise."""
+    """Return the sample at which a swing crosses its middle; noise blurs the ends."""
     swing = values[turn : following + 1] - values[turn]
     return turn + int(np.argmax(np.abs(swing) >= abs(swing[-1]) / 2))
 
@@ -410,7 +411,7 @@ def _near_ends(values: _Values, gate: float) -> float:
 
 
 def _means(times: _Values, wanted: _Values, edges: _Values) -> _Values:
-    """Return the means of a command, which holds its value until its next sample, between edges."""
+    """Return the means between edges of a command that holds its value until the next sample."""
     areas = np.concatenate([[0.0], np.cumsum(wanted[:-1] * np.diff(times))])
     last = np.maximum(np.searchsorted(times, edges, side="right") - 1, 0)
     means: _Values = np.diff(areas[last] + wanted[last] * (edges - times[last])) / np.diff(edges)
@@ -418,11 +419,11 @@ def _means(times: _Values, wanted: _Values, edges: _Values) -> _Values:
 
 
 def _own_swing(turns: _Values, times: _Values, wanted: _Values) -> float:
-    """Return how much the command swings with a stem that turns at these times.
+    """Return the swing of the command over the swings of a stem that turns at these times.
 
-    It is the change of its mean from one swing to the next, and that a quarter of a period later,
-    as the square root of the sum of their squares: so the lag of the stem does not matter. Of a
-    sine it is 4/π of the amplitude.
+    It is the root sum square of two changes of the mean from one swing to the next: of the swings
+    themselves, and of swings shifted by a quarter of a period. The lag of the stem then does not
+    matter. For a sine the result is 4/π of the amplitude.
     """
     edges = turns, (turns[1:] + turns[:-1]) / 2
     changes = [np.median(np.abs(np.diff(_means(times, wanted, each)))) for each in edges]
@@ -432,22 +433,22 @@ def _own_swing(turns: _Values, times: _Values, wanted: _Values) -> float:
 def hunting(
     stem: Samples, pressure: Samples, wanted: Samples, since: int, travel: float
 ) -> Hunting | None:
-    """Look for a limit cycle since the command stands still.
+    """Look for a limit cycle while the command is constant.
 
     Parameters
     ----------
     stem, pressure, wanted : Samples
-        Position, m, pressure, Pa, and command, m, at about ten samples a second or, of the command,
-        when it changes.
+        Position, m, pressure, Pa, and command, m, at about ten samples per second; the command may
+        come only when it changes.
     since : int
-        Since when the command stands still, ns.
+        Time from which the command is constant, ns.
     travel : float
-        m.
+        Travel, m.
 
     Returns
     -------
     Hunting or None
-        None without five regular swings, or where the command itself swings with them.
+        None without five regular swings, or if the command itself swings with the stem.
     """
     held = stem.stamps >= since
     times, x = (stem.stamps[held] - since) / 1e9, stem.values[held] / travel

@@ -7,10 +7,10 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The moves of the last time in robust figures, and what they mean.
+"""Robust figures of the latest moves, and what they mean.
 
-The actuator pressure tells whether the positioner or the valve is to blame. A stem that ignores
-large steps has seized, its sensor is frozen, or it gets no pressure.
+The actuator pressure shows whether the positioner or the valve is at fault. If the stem ignores
+large steps, it has seized, its sensor is frozen, or it gets no pressure.
 """
 
 import math
@@ -27,23 +27,24 @@ from valve_friction_ros.response.moves import Hunting, StepAnswer
 from valve_friction_ros.wording import Code, said
 
 _DOMINANT = 0.6
-"""Share of a time, or of a deviation, above which one part of it is the cause."""
+"""Share of a time, or of a deviation, from which one part of it is the cause."""
 
 _STICKY = 0.02
-"""Pressure that friction takes, as the travel that it would make, above which it is to blame:
-twice the dead band of a good valve (1 %)."""
+"""Pressure needed to overcome friction, as the travel it would give, from which friction is the
+cause: twice the dead band of a good valve (1 %)."""
 
 _FREE = 0.01
-"""As above: what a good valve takes."""
+"""The same pressure, as a good valve needs it, up to which friction is not the cause."""
 
 _FEWEST_JUDGED = 5
-"""Moves that a verdict needs."""
+"""Moves needed for a verdict."""
 
 _MAJORITY = 0.8
-"""Share of them that must agree."""
+"""Share of the moves that must agree."""
 
 _LEAST_SPREAD = 0.05
-"""Share of the travel over which steady positions must lie to give the travel per pressure."""
+"""Least distance between two steady positions that give the travel per pressure, share of the
+travel."""
 
 _MOST_POINTS = 30
 
@@ -51,7 +52,7 @@ _FEWEST_OF_A_DIRECTION = 3
 
 
 class AnswerCause(Enum):
-    """What makes a stem late, slow or wrong."""
+    """Cause of a late, slow or inaccurate stem."""
 
     FRICTION = auto()
     LATE = auto()
@@ -59,19 +60,19 @@ class AnswerCause(Enum):
     SETTING = auto()
     UNKNOWN = auto()
     PRESSURE_ANSWERS = auto()
-    """Of ignored steps: to all of them, which the stem does not follow."""
+    """For ignored steps: the pressure responds to every step, but the stem does not follow."""
     PRESSURE_SILENT = auto()
     PRESSURE_ANSWERS_SOME = auto()
     STICTION = auto()
-    """Of hunting."""
+    """For hunting."""
     NOT_FRICTION = auto()
 
 
 def travel_per_pressure(moves: Sequence[StepAnswer]) -> float:
-    """Return the share of the travel that a pascal makes; nan if not known.
+    """Return the travel per pressure, share of the travel per pascal; nan if unknown.
 
-    It is the median slope between the ends of two moves of one direction (Theil and Sen), which
-    friction holds off to the same side.
+    It is the median slope between the ends of two moves in the same direction (Theil and Sen):
+    friction offsets both ends to the same side.
     """
     slopes = []
     for way in (-1.0, 1.0):
@@ -88,7 +89,7 @@ def travel_per_pressure(moves: Sequence[StepAnswer]) -> float:
 
 
 def _by_push(move: StepAnswer, slope: float, otherwise: AnswerCause) -> AnswerCause:
-    """Blame friction if it took much pressure, and `otherwise` if it took little."""
+    """Return friction if the stem needed much pressure to move, `otherwise` if it needed little."""
     push = move.push * slope
     if push >= _STICKY:
         return AnswerCause.FRICTION
@@ -96,7 +97,7 @@ def _by_push(move: StepAnswer, slope: float, otherwise: AnswerCause) -> AnswerCa
 
 
 def late_cause(move: StepAnswer, slope: float) -> AnswerCause:
-    """Return why a stem began to move late, or did not."""
+    """Return why a stem began to move late or not at all."""
     total = move.dead_time if move.moved else move.held
     if not move.pressure_rested:
         return _by_push(move, slope, AnswerCause.UNKNOWN)
@@ -109,7 +110,7 @@ def late_cause(move: StepAnswer, slope: float) -> AnswerCause:
 
 
 def slow_cause(move: StepAnswer, slope: float) -> AnswerCause:
-    """Return why a stem had late what it should have had at T86."""
+    """Return why a stem reached 86.5 % of its move late."""
     if not move.t86 > 0 or not move.pressure_rested:
         return AnswerCause.UNKNOWN
     late = min(move.pressure_delay, move.dead_time)
@@ -127,10 +128,10 @@ def slow_cause(move: StepAnswer, slope: float) -> AnswerCause:
 
 
 def deviation_cause(moves: Sequence[StepAnswer], slope: float) -> AnswerCause:
-    """Return why a stem comes to rest where the command does not want it.
+    """Return why a stem settles away from its command.
 
-    Friction leaves it behind after moves of either direction. Where the stem is off to one side
-    after both, its pressure has been led there, if the stem moves at all.
+    Friction leaves the stem short of the command in both directions. If the stem is off to the same
+    side after both, the setting of the positioner is the cause, provided that the stem moves.
     """
     resting = [m for m in moves if m.settled and not m.at_stop]
     follows = 2 * sum(m.moved for m in resting) > len(resting)
@@ -154,10 +155,10 @@ def deviation_cause(moves: Sequence[StepAnswer], slope: float) -> AnswerCause:
 def majority_cause(
     moves: Sequence[StepAnswer], slope: float, cause_of: Callable[[StepAnswer, float], AnswerCause]
 ) -> AnswerCause:
-    """Return what most moves blame.
+    """Return the cause on which most moves agree.
 
-    Moves from or to a stop, and of a stem that did not rest, are left out. Fewer than five, or
-    less than four in five that agree, tell nothing.
+    Moves from or to a stop, and moves of a stem that did not rest before, are left out. The cause
+    is unknown with fewer than five moves, or if less than four in five agree.
     """
     asked = [cause_of(m, slope) for m in moves if m.rested and not m.at_stop]
     if len(asked) >= _FEWEST_JUDGED:
@@ -168,30 +169,31 @@ def majority_cause(
 
 
 ANSWER_TIME = 5.0
-"""Time, s, for which a step must last before a stem that rests has ignored it."""
+"""Time, s, that a step must last before a stem that does not move has ignored it."""
 
 _LATEST, _MOST_ANSWERED = 5, 1
-"""Latest large steps that are judged, and how many of them a stem in trouble may have answered."""
+"""Latest large steps that are judged, and the most that a faulty valve may have answered."""
 
 _LEAST_STEP, _LARGE_STEP = 0.02, 0.05
-"""Share of the travel: no step below the first is large, twice the dead band of a good valve (1 %),
-and every step of the second is, unless the dead band is known to be wider. Chosen."""
+"""Bounds of a large step, share of the travel. No step below the first is large: it is twice the
+dead band of a good valve (1 %). Every step from the second on is large, unless the dead band is
+known to be wider. Chosen."""
 
 _FROM_STOP = 0.1
-"""Share of the travel that a step from or to a stop must have: a positioner may hold the stem on
-its seat up to a few percent (cut-off). Chosen."""
+"""Least size of a large step from or to a stop, share of the travel: a positioner may hold the stem
+on its seat up to a few percent (cut-off). Chosen."""
 
 
 @dataclass(frozen=True)
 class IgnoredSteps:
-    """The latest large steps, most of which the stem has ignored.
+    """The latest large steps, most of which the stem ignored.
 
     Attributes
     ----------
     latest : tuple of StepAnswer
-        They, the answered ones too.
+        The steps, including those that the stem answered.
     least : float
-        Share of the travel from which a step is large.
+        Size from which a step is large, share of the travel.
     """
 
     latest: tuple[StepAnswer, ...]
@@ -199,12 +201,12 @@ class IgnoredSteps:
 
     @property
     def number(self) -> int:
-        """How many were ignored."""
+        """Number of ignored steps."""
         return sum(map(has_ignored, self.latest))
 
     @property
     def cause(self) -> AnswerCause:
-        """What the pressure has left to suspect."""
+        """Cause by the response of the pressure."""
         answered = [math.isfinite(m.pressure_delay) for m in self.latest if has_ignored(m)]
         if all(answered):
             return AnswerCause.PRESSURE_ANSWERS
@@ -212,33 +214,32 @@ class IgnoredSteps:
 
 
 def has_ignored(move: StepAnswer) -> bool:
-    """Return whether a step lasted long enough and did not move the stem."""
+    """Return whether a step lasted long enough but did not move the stem."""
     return not move.moved and move.held >= ANSWER_TIME
 
 
 def large_step(moves: Sequence[StepAnswer], dead_band: float = math.nan) -> float:
-    """Return from which size on a stem should answer a step, share of the travel.
+    """Return the size from which a stem should answer a step, share of the travel.
 
-    It is the dead band where that is known, else the median of the steps that were answered, or 5 %
-    if none was.
+    It is the dead band if known, else the median of the answered steps, or 5 % without any.
     """
     if math.isfinite(dead_band):
         return max(dead_band, _LEAST_STEP)
     sizes = [abs(m.change) for m in moves if m.moved]
-    # Commands of one size differ by their rounding.
+    # Commands of the same size differ by rounding.
     usual = (1 - 1e-6) * float(np.median(sizes)) if sizes else _LARGE_STEP
     return min(max(usual, _LEAST_STEP), (1 - 1e-6) * _LARGE_STEP)
 
 
 def ignored_steps(moves: Sequence[StepAnswer], dead_band: float = math.nan) -> IgnoredSteps | None:
-    """Return the latest five large steps if at most one of them was answered; else None.
+    """Return the latest five large steps if the stem answered at most one; else None.
 
     Parameters
     ----------
     moves : sequence of StepAnswer
         Oldest first.
     dead_band : float
-        Share of the travel; nan if not known.
+        Share of the travel; nan if unknown.
     """
     least = large_step(moves, dead_band)
     large = [
@@ -253,17 +254,17 @@ def ignored_steps(moves: Sequence[StepAnswer], dead_band: float = math.nan) -> I
 
 
 SIZES = (0.0, 0.005, 0.01, 0.02, 0.05, 0.1, math.inf)
-"""Bounds of the classes of steps, share of the travel."""
+"""Bounds of the size classes of steps, share of the travel."""
 
 FIGURES = ("dead_time", "t63", "t86", "overshoot", "steady_error", "steady_deviation")
 """Names of the figures of a summary that are spreads."""
 
 _FEWEST_COMPARED = 5
-"""Moves whose median is compared with a limit."""
+"""Moves needed to compare their median with a limit."""
 
 
 class Spread(NamedTuple):
-    """Median and 10 % and 90 % quantiles of some moves; nan without any."""
+    """Median, and 10 % and 90 % quantiles, over several moves; nan without moves."""
 
     median: float
     low: float
@@ -272,7 +273,7 @@ class Spread(NamedTuple):
 
     @classmethod
     def of(cls, values: Sequence[float]) -> "Spread":
-        """Describe the finite ones of some values."""
+        """Return the spread of the finite values."""
         finite = [value for value in values if math.isfinite(value)]
         if not finite:
             return cls(math.nan, math.nan, math.nan, 0)
@@ -280,7 +281,7 @@ class Spread(NamedTuple):
         return cls(median, low, high, len(finite))
 
     def to_dict(self) -> dict[str, Any]:
-        """Return a mapping of plain values, None where nothing is known."""
+        """Return a mapping of plain values, None where unknown."""
         return {name: _known(value) for name, value in self._asdict().items()}
 
 
@@ -290,16 +291,16 @@ def _known(value: float) -> float | None:
 
 @dataclass(frozen=True)
 class ResponseLimits:
-    """Limits of the answer in service; 0: none.
+    """Limits of the response in service; 0 for no limit.
 
-    A plant must set them: what is late depends on the loop, and a dead time on the step.
+    The plant must set them: the time allowed depends on the loop, and the dead time on the step.
 
     Attributes
     ----------
     deviation : float
-        Magnitude of the steady deviation, median of the moves, share of the travel.
+        Limit of the median magnitude of the steady deviation, share of the travel.
     dead_time, t86 : float
-        Medians of the moves, s.
+        Limits of the medians, s.
     """
 
     deviation: float = 0.0
@@ -307,33 +308,33 @@ class ResponseLimits:
     t86: float = 0.0
 
     def __post_init__(self) -> None:
-        """Refuse limits below zero."""
+        """Refuse negative limits."""
         if min(self.deviation, self.dead_time, self.t86) < 0:
             raise ValueError("limits of the response must not be negative")
 
 
 @dataclass(frozen=True)
 class ResponseSummary:
-    """The answers to the latest steps.
+    """Responses to the latest steps.
 
     Attributes
     ----------
     moves : tuple of StepAnswer
-        The steps that were evaluated.
+        The evaluated steps.
     dead_time, t63, t86 : Spread
-        s.
+        Times, s.
     overshoot : Spread
         Share of the move.
     steady_error : Spread
-        Command less position, share of the travel, with its sign.
+        Command minus position, share of the travel, signed.
     steady_deviation : Spread
-        Its magnitude.
+        Magnitude of the steady error.
     ignored : tuple of StepAnswer
-        Steps that lasted at least five seconds and did not move the stem.
+        Steps that lasted at least five seconds but did not move the stem.
     by_size : tuple of (int, int)
-        Steps that moved the stem, and all, in each class of `SIZES`.
+        Number of answered steps, and of answered and ignored steps, in each class of `SIZES`.
     travel_per_pressure : float
-        Share of the travel that a pascal makes; nan if not known.
+        Share of the travel per pascal; nan if unknown.
     """
 
     moves: tuple[StepAnswer, ...]
@@ -348,7 +349,7 @@ class ResponseSummary:
     travel_per_pressure: float
 
     def to_dict(self) -> dict[str, Any]:
-        """Return a mapping of plain values, None where nothing is known; times in s."""
+        """Return a mapping of plain values, None where unknown; times in s."""
         return {
             "moves": len(self.moves),
             "ignored": len(self.ignored),
@@ -359,18 +360,18 @@ class ResponseSummary:
 
     @property
     def largest_ignored(self) -> float:
-        """90 % quantile of the steps that the stem ignored, share of the travel; 0: none."""
+        """90 % quantile of the size of ignored steps, share of the travel; 0 without any."""
         return float(np.percentile([abs(m.change) for m in self.ignored] or [0.0], 90))
 
     @property
     def smallest_answered(self) -> float:
-        """10 % quantile of those that it answered; nan if none."""
+        """10 % quantile of the size of answered steps, share of the travel; nan without any."""
         return Spread.of([abs(m.change) for m in self.moves if m.moved]).low
 
     def least_dead_time(self, dead_band: float = math.nan) -> Spread:
-        """Return the dead times, s, with the time that large steps which were ignored have lasted.
+        """Return the dead times, s, where ignored large steps enter with the time they lasted.
 
-        The latter is a lower bound. `dead_band` is a share of the travel, nan if not known.
+        That time is a lower bound. `dead_band` is a share of the travel, nan if unknown.
         """
         large = large_step(self.moves, dead_band)
         return Spread.of(
@@ -381,9 +382,9 @@ class ResponseSummary:
         )
 
     def cause(self, which: str, limit: float = 0.0) -> AnswerCause:
-        """Return what is to blame for the `dead_time`, the `t86` or the `deviation`.
+        """Return the cause of the `dead_time`, the `t86` or the `deviation`.
 
-        The moves beyond the limit are asked; without a limit, the slower half.
+        A time is judged by the moves beyond the limit; without a limit, by the slower half.
         """
         slope = self.travel_per_pressure
         if which == "deviation":
@@ -403,7 +404,7 @@ class ResponseSummary:
 
 
 def summarised(moves: Sequence[StepAnswer]) -> ResponseSummary:
-    """Summarise moves; those whose stem may still have answered count as neither."""
+    """Summarise moves; a step too short to judge is neither answered nor ignored."""
     ignored = tuple(m for m in moves if has_ignored(m))
     counted = [m for m in moves if m.moved or has_ignored(m)]
     by_size = []
@@ -435,10 +436,10 @@ def response_findings(
     swinging: Hunting | None,
     dead_band: float = math.nan,
 ) -> list[Finding]:
-    """Say what is wrong with the answers.
+    """Return the faults of the response.
 
-    That is: large steps that are ignored, limits that the median of five moves passes, hunting. The
-    dead band is a share of the travel, nan if not known.
+    These are ignored large steps, a median of at least five moves beyond its limit, and hunting.
+    The dead band is a share of the travel, nan if unknown.
     """
     findings = []
     ignored = ignored_steps(summary.moves, dead_band)
