@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Evidence that adds up: moves of a valve in service, and what they say together; no ROS."""
+"""Evidence from service: moves of a valve, and the friction they show together; no ROS."""
 
 from typing import TYPE_CHECKING
 

@@ -7,9 +7,9 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Force balances of moves as linear equations: their robust solution, and its covariance.
+"""Force balances of moves as linear equations, their robust solution and its covariance.
 
-Moves of one block of time have correlated errors, so the scatter of blocks gives the interval.
+Moves in one block of time have correlated errors, so the scatter of blocks gives the interval.
 """
 
 import math
@@ -24,21 +24,21 @@ from valve_friction_ros.evidence.moves import Moves
 from valve_friction_ros.identification.trust.uncertainty import MEDIAN_MAGNITUDE, student_quantile
 
 BLOCK = 600.0
-"""Least time, s, of moves whose errors are taken as correlated."""
+"""Least duration, s, of a block of moves, whose errors are taken as correlated."""
 
 _LEAST_MOVES = 4
-"""And least number of such moves in each direction."""
+"""Least number of moves in a block in each direction."""
 
 
 def blocks_of(moves: Moves, most: int | None = None) -> NDArray[np.intp]:
-    """Return the block of each move: ten minutes at least, and some moves in each direction.
+    """Return the block of each move; a block has at least ten minutes and moves both ways.
 
     Parameters
     ----------
     moves : Moves
         The moves, oldest first.
     most : int, optional
-        Number of blocks that is hardly passed: beyond it they are longer.
+        Approximate upper limit of the number of blocks, kept by longer blocks.
     """
     if not len(moves):
         return np.array([], dtype=np.intp)
@@ -59,34 +59,34 @@ def blocks_of(moves: Moves, most: int | None = None) -> NDArray[np.intp]:
 
 
 SPRING, SPEED, ALONG, STATIC, PRELOAD = range(5)
-"""Places of the unknowns. Deviations of the preload follow, one an epoch; frictions are last."""
+"""Indices of the unknowns. Deviations of the preload follow, one per epoch; frictions are last."""
 
 SLIDING = -1
 
 _EPOCH = 3600.0
-"""Time, s, over which the preload stays the same: temperature and sensors drift over longer."""
+"""Time, s, over which the preload is constant: temperature and sensors drift more slowly."""
 
 _MOST_EPOCHS = 60
-"""Their number is bounded: months of a quiet valve cost no more than hours of a busy one."""
+"""Largest number of epochs: months of a quiet valve cost no more than hours of a busy valve."""
 
 _SPEED, _ALONG, _DRIFT = 1.0, 0.5, 0.2
-"""Standard deviations of what friction may change by with the speed, at the mean speed, and along
-the travel; and of the preload from hour to hour; as shares of the sliding friction."""
+"""Standard deviations, as shares of the sliding friction: of its change with speed, at the mean
+speed; of its change along the travel; and of the preload from hour to hour."""
 
 _SIDE, _LEAST_OF_A_SIDE, _SEARCHED = 12, 3, 6
-"""Moves on either side of a step of the preload that are compared, least number of them in each
-direction, and moves to either side within which the step is then placed."""
+"""Moves compared on either side of a step of the preload; their least number in each direction; and
+moves to either side within which the step is then located."""
 
 _STEP_ERRORS, _STEP_SHARE, _MOST_STEPS = 6.0, 0.25, 120
-"""Standard errors, and share of the friction, from which the preload has stepped; and how many
-steps are followed. Smaller ones are drift or outliers."""
+"""Standard errors, and share of the friction, from which the preload has stepped; and most steps
+that are followed. Smaller steps are drift or outliers."""
 
 _FASTEST = 3.0
-"""Speed of a move, over the mean, beyond which its friction is taken to change no further."""
+"""Speed of a move, over the mean, beyond which friction is assumed to change no further."""
 
 _ONSET = 0.25
-"""Weight of a breakaway. It alone decides the static friction; of the rest it knows less than a
-move."""
+"""Weight of a breakaway. Breakaways alone determine the static friction, but they determine the
+other unknowns less well than moves."""
 
 _HUBER = 2.0
 _ROUNDS = 4
@@ -95,7 +95,7 @@ _QUIETEST = 1e-3
 
 
 class Scales(NamedTuple):
-    """A rough friction (N), the mean place (m) and the mean speed (m/s) of moves."""
+    """Scales of moves: rough friction (N), mean position (m) and mean speed (m/s)."""
 
     friction: float
     place: float
@@ -104,24 +104,24 @@ class Scales(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Design:
-    """Rows of linear equations of force.
+    """Linear equations of force, in rows.
 
     The unknowns are the spring constant (N/m), the change of friction with speed (N·s/m) and along
-    the travel (N/m), the static friction (N), the preload (N) at the mean place, its deviations by
-    epoch, and last one sliding friction (N) or several.
+    the travel (N/m), the static friction (N), the preload (N) at the mean position, its deviations
+    by epoch, and last one or several sliding frictions (N).
 
     Attributes
     ----------
     dense : ndarray of float, shape (n, 5)
         Regressors of the unknowns up to `PRELOAD`.
     epoch, group : ndarray of int, shape (n,)
-        Deviation of the preload, and sliding friction, of each row.
+        Index of the preload deviation and of the sliding friction in each row.
     way : ndarray of float, shape (n,)
         Regressor of the sliding friction: ±1, or 0 for a breakaway.
     force, weight, rate : ndarray of float, shape (n,)
         Force, N; weight, mean 1; and rate of the force, N/s.
     epochs, groups : int
-        Number of deviations, 0 where the preload has none, and of sliding frictions.
+        Number of preload deviations, 0 without any, and of sliding frictions.
     step : float
         Largest step of the preload, N; 0 without any.
     """
@@ -139,12 +139,12 @@ class Design:
 
     @property
     def shared(self) -> int:
-        """Number of the unknowns but the sliding frictions."""
+        """Number of unknowns without the sliding frictions."""
         return PRELOAD + 1 + self.epochs
 
     @property
     def size(self) -> int:
-        """Number of the unknowns."""
+        """Number of unknowns."""
         return self.shared + self.groups
 
     def rows(self) -> NDArray[np.float64]:
@@ -158,7 +158,7 @@ class Design:
         return rows
 
     def normal(self, weight: NDArray[np.float64], precision: NDArray[np.float64]) -> "Normal":
-        """Return the normal equations of weighted rows, and of priors about zero."""
+        """Return the normal equations of weighted rows and of priors about zero."""
         dense, first, shared = self.dense * weight[:, None], PRELOAD + 1, self.shared
         both, mixed = np.diag(precision[:shared]), np.zeros((shared, self.groups))
         both[:first, :first] += dense.T @ self.dense
@@ -174,7 +174,7 @@ class Design:
         return Normal(both, mixed, friction)
 
     def right(self, weighted: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the right side of the normal equations of weighted targets, shape (p,)."""
+        """Return the right-hand side of the normal equations for weighted targets, shape (p,)."""
         epochs = np.bincount(self.epoch, weighted, self.epochs)[: self.epochs]
         frictions = np.bincount(self.group, weighted * self.way, self.groups)
         return np.concatenate((self.dense.T @ weighted, epochs, frictions))
@@ -194,12 +194,12 @@ def _sums(rows: NDArray[np.float64], places: NDArray[np.intp], count: int) -> ND
 class Normal(NamedTuple):
     """Normal equations of s shared unknowns and g sliding frictions.
 
-    Hundreds of frictions cost little: none meets another one, so they are eliminated first.
+    No row contains two frictions. They are eliminated first, so hundreds of frictions cost little.
 
     Attributes
     ----------
     shared, mixed, friction : ndarray of float, shapes (s, s), (s, g), (g,)
-        Their parts; that of the frictions is diagonal.
+        Blocks of the matrix; the block of the frictions is diagonal.
     """
 
     shared: NDArray[np.float64]
@@ -215,7 +215,7 @@ class Normal(NamedTuple):
         return np.concatenate((shared, right[size:] / self.friction - ratio.T @ shared))
 
     def friction_covariance(self) -> NDArray[np.float64]:
-        """Return the block of the inverse that belongs to the frictions, shape (g, g)."""
+        """Return the block of the inverse for the frictions, shape (g, g)."""
         ratio = self.mixed / self.friction
         left = self.shared - ratio @ self.mixed.T
         return np.diag(1.0 / self.friction) + ratio.T @ solution(left, ratio)
@@ -234,12 +234,12 @@ def scales_of(moves: Moves) -> Scales:
 
 
 class Levels(NamedTuple):
-    """Levels of the preload, between steps of the process force.
+    """Levels of the preload between steps of the process force.
 
     Attributes
     ----------
     number : ndarray of int, shape (n,)
-        Level of each move, from 0 on.
+        Level of each move, counted from 0.
     largest : float
         Largest step, N.
     """
@@ -251,9 +251,9 @@ class Levels(NamedTuple):
 def levels_of(moves: Moves) -> Levels:
     """Find the steps of the process force.
 
-    A pressure on the plug shifts the forces of moves up and of moves down alike, friction shifts
-    them apart. So the mean of both medians, after and before a place, steps with the process force
-    and not with friction; medians ignore the move in which it steps.
+    A pressure on the plug shifts the forces of upward and downward moves alike; friction shifts
+    them apart. The mean of the medians of both directions therefore steps with the process force
+    and not with friction. Medians ignore the move during which the process force steps.
     """
     count, way = len(moves), moves.direction
     number = np.zeros(count, dtype=np.intp)
@@ -286,7 +286,7 @@ def levels_of(moves: Moves) -> Levels:
 def _without_spring(moves: Moves) -> tuple[NDArray[np.float64], float]:
     """Return the forces of moves without spring and friction, N, and the friction.
 
-    Fitted to differences of successive moves, where each step of the preload is one outlier.
+    The fit uses differences of successive moves, where each step of the preload is one outlier.
     """
     way = moves.direction
     rows = np.column_stack((way, moves.place, way * moves.speed))
@@ -305,9 +305,9 @@ def _without_spring(moves: Moves) -> tuple[NDArray[np.float64], float]:
 
 
 def _medians(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return medians before and from each place on, and of how many; shape (2, 2, n).
+    """Return the medians before and after each place, and the numbers of values; shape (2, 2, n).
 
-    A value that is nan does not count.
+    The value at the place belongs to the second side. Values of nan are ignored.
     """
     padded = np.concatenate((np.full(_SIDE, np.nan), values, np.full(_SIDE, np.nan)))
     windows = np.sort(np.lib.stride_tricks.sliding_window_view(padded, _SIDE), axis=1)
@@ -319,7 +319,7 @@ def _medians(values: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def design_of(moves: Moves, frictions: NDArray[np.intp], scales: Scales) -> Design:
-    """Return the rows of moves, with one friction for each number in `frictions`."""
+    """Return the rows of moves, with one friction per number in `frictions`."""
     passed = moves.time - moves.time[0]
     epoch = max(_EPOCH, float(passed[-1]) / (_MOST_EPOCHS - 1))
     levels = levels_of(moves)
@@ -346,7 +346,7 @@ def design_of(moves: Moves, frictions: NDArray[np.intp], scales: Scales) -> Desi
 
 
 def with_onsets(design: Design, moves: Moves, place: float) -> Design:
-    """Add a row for each breakaway, in their order."""
+    """Append one row per breakaway, in the order of the moves."""
     begun = np.isfinite(moves.onset_force)
     way, away = moves.direction[begun], moves.onset_position[begun] - place
     dense = design.dense[begun]
@@ -365,7 +365,7 @@ def with_onsets(design: Design, moves: Moves, place: float) -> Design:
 
 
 def priors(design: Design, scales: Scales, moves: Moves, travel: float) -> NDArray[np.float64]:
-    """Return the precision of the prior of each unknown, all about zero."""
+    """Return the precision of the prior of each unknown; all priors are about zero."""
     friction, _, speed = scales
     precision = np.full(design.size, 1.0 / math.hypot(_DRIFT * friction, design.step) ** 2)
     precision[[SPRING, PRELOAD]] = 0.0
@@ -380,7 +380,7 @@ def priors(design: Design, scales: Scales, moves: Moves, travel: float) -> NDArr
 def robust(
     design: Design, target: NDArray[np.float64], precision: NDArray[np.float64], friction: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the unknowns by Huber's weights, and the weights of the rows, 1/N²."""
+    """Return the unknowns found with Huber's weights, and the weights of the rows, 1/N²."""
     deviation = friction
     factor: NDArray[np.float64] = np.ones(target.size, dtype=np.float64)
     values: NDArray[np.float64] = np.zeros(design.size, dtype=np.float64)
@@ -394,9 +394,9 @@ def robust(
 
 
 def solution(normal: NDArray[np.float64], right: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Solve with unknowns of one size; one that nothing determines stays zero.
+    """Solve with the unknowns scaled to one size; an undetermined unknown stays zero.
 
-    Several systems are solved at once where both have another axis before.
+    A leading axis in both arguments solves several systems at once.
     """
     size = np.sqrt(np.maximum(np.diagonal(normal, axis1=-2, axis2=-1), 1e-300))
     scaled = normal / (size[..., :, None] * size[..., None, :]) + 1e-12 * np.eye(size.shape[-1])
@@ -406,22 +406,22 @@ def solution(normal: NDArray[np.float64], right: NDArray[np.float64]) -> NDArray
 
 
 MOST_BLOCKS = 60
-"""Blocks of an estimate at most: the intervals of more are no narrower."""
+"""Most blocks of an estimate: more would not narrow its intervals."""
 
 FEWEST_BLOCKS = 4
-"""Blocks below which nothing is estimated: their scatter gives the interval."""
+"""Fewest blocks of an estimate: their scatter gives the interval."""
 
 FEWEST_MOVES = 12
-"""Moves in each direction below which nothing is estimated."""
+"""Fewest moves of an estimate in each direction."""
 
 _SYSTEMATIC = 0.02
-"""Standard deviation, as a share of the friction, of what no scatter shows: presliding, sampling,
-and the travel in motions that are too short to be a move. Chosen: a packing that bends by 25 µm
-before it slides changes the mean friction of 0.5 mm by some 4 %."""
+"""Standard deviation, as a share of the friction, of errors that no scatter shows: presliding,
+sampling, and travel in motions too short to be a move. Chosen: a packing that bends by 25 µm before
+it slides changes the mean friction of 0.5 mm by some 4 %."""
 
 _BENT = 0.005
-"""The same of a friction that follows speed and place by another law than a line: what it adds to
-the spring constant, over the scatter of the places."""
+"""The same for a friction that is not linear in speed and position. Divided by the scatter of the
+positions, it is an error of the spring constant."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -435,21 +435,21 @@ class Balance:
         static friction (N), preload (N) at `place`, its deviations by epoch, and last the sliding
         friction (N).
     scatter : ndarray of float, shape (p, p)
-        Covariance by the scatter of blocks, and by the priors.
+        Covariance from the scatter of blocks and from the priors.
     systematic : ndarray of float, shape (p, p)
-        Covariance by the lag of the signals, and by what no scatter shows.
+        Covariance from the lag of the signals and from errors that no scatter shows.
     quantile : float
-        Half width of a 95 % interval over the standard error, of what scatters.
+        Half width of a 95 % interval over the standard error, for the scatter.
     speed : float
-        Speed that the sliding friction belongs to, ∫|v|·|dx| / ∫|dx| of all moves, m/s.
+        Speed to which the sliding friction applies, ∫|v|·|dx| / ∫|dx| of all moves, m/s.
     place : float
         Mean position of the moves, m.
     onsets : int
-        Moves that began at a rest.
+        Number of moves that began at rest.
     timing : float
         Standard deviation of the lag between the signals, s.
     lag : ndarray of float, shape (p,)
-        Change of the values by a lag of 1 s.
+        Change of the values for a lag of 1 s.
     """
 
     values: NDArray[np.float64]
@@ -463,7 +463,7 @@ class Balance:
     lag: NDArray[np.float64]
 
     def number(self, slope: NDArray[np.float64]) -> tuple[float, float]:
-        """Return standard error and half width of a number, by its derivatives to the values."""
+        """Return standard error and half width of a number from its derivatives by the values."""
         random, fixed = (
             math.sqrt(max(float(slope @ one @ slope), 0.0))
             for one in (self.scatter, self.systematic)
@@ -474,7 +474,7 @@ class Balance:
 def balance_of(
     moves: Moves, timing: float, travel: float, spring_constant: float | None = None
 ) -> Balance | None:
-    """Combine moves.
+    """Estimate the unknowns from moves.
 
     Parameters
     ----------
@@ -490,16 +490,16 @@ def balance_of(
     Returns
     -------
     Balance or None
-        None where there are too few moves.
+        None with too few moves.
 
     Notes
     -----
-    Weights are the distances: the sliding friction is the mean over the distance. Outliers have
-    Huber's weights. The unknowns but friction, spring and first preload have priors, in the
-    covariance too. The scatter is that of leaving out one block of time after the other
-    (jackknife), which holds for errors that are correlated within a block. A lag of the signals
-    is not estimated, since a friction that changes with speed looks like one: its uncertainty is
-    carried into all numbers.
+    Moves are weighted by distance, so the sliding friction is the mean over the distance. Outliers
+    have Huber's weights. All unknowns except friction, spring and first preload have priors, which
+    enter the covariance too. The scatter comes from leaving out one block of time after another
+    (jackknife), which is valid for errors correlated within a block. The lag of the signals is not
+    estimated, since a friction that changes with speed looks like a lag. Its uncertainty enters all
+    numbers.
     """
     blocks = blocks_of(moves, MOST_BLOCKS)
     count = int(blocks[-1]) + 1 if len(moves) else 0
@@ -541,7 +541,7 @@ def _covariance(
     blocks: NDArray[np.intp],
     precision: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the covariance by scatter and priors, and the change of the values by 1 s of lag."""
+    """Return the covariance from scatter and priors, and the change of the values per 1 s lag."""
     order = np.argsort(blocks, kind="stable")
     rows, weight = design.rows()[order], weight[order]
     weighted = rows * weight[:, None]
@@ -554,7 +554,7 @@ def _covariance(
     spread = without - without.mean(axis=0)
     inverse = solution(normal, np.eye(design.size))
     by_blocks = (count - 1) / count * spread.T @ spread + inverse @ np.diag(precision) @ inverse
-    # The larger of both, one by one: the scatter of few blocks may be small by chance.
+    # The larger variance of each unknown: the scatter of few blocks may be small by chance.
     larger = np.diag(inverse) / np.maximum(np.diag(by_blocks), 1e-300)
     grown = np.sqrt(np.maximum(larger, 1.0))
     return by_blocks * np.outer(grown, grown), solution(normal, design.rate[order] @ weighted)

@@ -7,10 +7,10 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The evidence of a ledger of moves: friction since it last changed, and that change.
+"""Friction from a ledger of moves: its value since it last changed, and that change.
 
-Changes are found in the series of sliding friction block by block, dated, and told from what is no
-change.
+Changes are found and dated in the series of sliding friction by block. Only large changes are
+declared.
 """
 
 import math
@@ -58,7 +58,7 @@ from valve_friction_ros.wording import percentage
 
 @dataclass(frozen=True, eq=False)
 class Series:
-    """Sliding friction of one block after the other, at one speed and one place.
+    """Sliding friction by block, at one speed and one position.
 
     Attributes
     ----------
@@ -67,7 +67,7 @@ class Series:
     friction : ndarray of float, shape (b,)
         Sliding friction, N.
     covariance : ndarray of float, shape (b, b)
-        By the scatter of moves, and by what speed and place leave open.
+        Covariance from the scatter of moves, and from what speed and position leave undetermined.
     first : ndarray of int, shape (b,)
         First move of each block.
     """
@@ -80,10 +80,10 @@ class Series:
 
 
 def series_of(moves: Moves, travel: float) -> Series | None:
-    """Return the friction block by block; None where there are fewer than two.
+    """Return the friction by block; None with fewer than two blocks.
 
-    Spring, speed and place have one coefficient each, found within the blocks, so neither a new
-    range of set points nor other speeds look like another friction.
+    Spring, speed and position have one coefficient each, determined within the blocks. Neither a
+    new range of set points nor other speeds are therefore taken for a change of friction.
     """
     blocks = blocks_of(moves)
     count = int(blocks[-1]) + 1 if len(moves) else 0
@@ -100,25 +100,25 @@ def series_of(moves: Moves, travel: float) -> Series | None:
 
 
 _LEAST_BLOCKS = 2
-"""Blocks on either side of a change: one alone may be an outlier."""
+"""Least blocks on either side of a change: a single block may be an outlier."""
 
 _SCATTER = 0.015
-"""Least standard deviation of one block, as a share of the friction, however quiet it is."""
+"""Least standard deviation of a block, as a share of the friction, however quiet it is."""
 
 _SURE_ERRORS = 5.0
-"""Standard errors from which two parts of a series are not the same friction.
+"""Standard errors from which two parts of a series differ in friction.
 
-Normal errors pass it once in 2·10⁶ comparisons; 1,000 hours have some 10⁵."""
+Normal errors exceed it once in 2·10⁶ comparisons; 1,000 hours have some 10⁵."""
 
 _RESET_THRESHOLD = 0.04
-"""Change from which the past is let go."""
+"""Relative change from which earlier moves are dropped from the estimate."""
 
 DECLARED = 0.15
-"""Change from which it is declared. Chosen: well beyond what a spring that is not straight, or a
-friction along the travel, can pretend, and below the 25 % of the first alarm."""
+"""Relative change from which it is declared. Chosen: well beyond what a nonlinear spring, or a
+friction that varies along the travel, can imitate, and below the 25 % of the first alarm."""
 
 _DATE = 9.0
-"""Square of the statistic, less than at its largest, up to which a date is possible: 3²."""
+"""Drop of the squared statistic below its maximum up to which a date is possible: 3²."""
 
 
 class Split(NamedTuple):
@@ -127,13 +127,13 @@ class Split(NamedTuple):
     Attributes
     ----------
     block : int
-        First block after it.
+        First block after the change.
     earliest, latest : float
         Interval of its time, as in `Moves`, s.
     size : float
-        Mean of the blocks after it over that of the blocks before it.
+        Mean of all blocks after the change over the mean of all blocks before.
     ratio : float
-        Friction after it over friction before it.
+        Friction after the change over friction before.
     low, high : float
         Interval of the ratio.
     """
@@ -148,16 +148,16 @@ class Split(NamedTuple):
 
     @property
     def is_declared(self) -> bool:
-        """Whether it is large enough to be told."""
+        """Whether it is large enough to be declared."""
         return abs(math.log(self.size)) >= math.log1p(DECLARED)
 
 
 def last_splits(series: Series) -> tuple[Split, ...]:
-    """Return the changes of a series, each within what came after the one before.
+    """Return the changes of a series, each found in the blocks after the previous change.
 
-    The generalized likelihood ratio of one step, over all its possible times; it is applied again
-    to the blocks after the step. The scatter between blocks is that of successive ones, so a slow
-    growth widens it little.
+    The test is the generalized likelihood ratio of one step over all its possible times. It is
+    repeated on the blocks after the step. The scatter between blocks comes from successive blocks,
+    so slow growth of friction widens it little.
     """
     found: list[Split] = []
     begin = 0
@@ -181,7 +181,7 @@ def _split(series: Series, begin: int) -> Split | None:
     inner = slice(_LEAST_BLOCKS - 1, count - _LEAST_BLOCKS)
     likeliest = inner.start + int(np.argmax(statistics[inner]))
     size = float(new[likeliest] / old[likeliest])
-    # An unlucky scale of few blocks needs more.
+    # Few blocks need more: their scatter may be small by chance.
     sure = _SURE_ERRORS * math.sqrt(1.0 + 4.0 / count)
     if statistics[likeliest] < sure or max(size, 1.0 / size) < 1.0 + _RESET_THRESHOLD:
         return None
@@ -190,7 +190,7 @@ def _split(series: Series, begin: int) -> Split | None:
     if place == count - 1:  # the last block may hold the change itself, or be an outlier
         return None
     possible = places[statistics**2 >= statistics[best] ** 2 - _DATE] + begin
-    # It lies within one of both blocks beside the place, so neither tells the ratio.
+    # The change lies within a block next to the place, so the ratio uses neither of the two.
     beside = np.array([place])
     found = contrasts.between(np.maximum(beside - 1, 1), beside + 1)
     before, after, error = (float(one[0]) for one in found)
@@ -207,9 +207,9 @@ def _split(series: Series, begin: int) -> Split | None:
 
 
 class _Contrasts:
-    """Means of the blocks before one place and from another one on, and of their difference.
+    """Means of the blocks before one place and from another place on, and their difference.
 
-    All come from sums over parts of the covariance, so hundreds of places cost little.
+    All use sums over parts of the covariance, so hundreds of places cost little.
     """
 
     def __init__(
@@ -236,15 +236,15 @@ class _Contrasts:
 
 
 def _between(friction: NDArray[np.float64]) -> float:
-    """Return the standard deviation of one block, N, by the differences of successive ones."""
+    """Return the standard deviation of a block, N, from differences of successive blocks."""
     steps = np.abs(np.diff(friction))
     scatter = float(np.median(steps)) / (MEDIAN_MAGNITUDE * math.sqrt(2.0))
     return max(scatter, _SCATTER * float(np.median(friction)))
 
 
 MOST_MOVES = 4096
-"""Moves of a ledger that are worth keeping: some half a day of a valve that never rests, or weeks
-of a quiet one. Chosen: they are combined in under 0.1 s."""
+"""Most moves worth keeping in a ledger: about half a day of a valve that never rests, or weeks of a
+quiet valve. Chosen: they are combined in under 0.1 s."""
 
 _NAMES = (
     "coulomb_friction",
@@ -256,10 +256,10 @@ _NAMES = (
     "dead_band",
 )
 _MAX_SPRING_REL_HALF_WIDTH = 0.25
-"""Half width of the spring constant, as a share of it, beyond which there is no dead band.
+"""Half width of the spring constant, over its value, beyond which no dead band is given.
 
-Chosen: moves over some tenths of the travel know it to ±4 %, moves that hardly leave their place to
-±50 %; friction that bends with the speed then moves the dead band by 10 %."""
+Chosen: moves over some tenths of the travel determine it to ±4 %, moves around one position to
+±50 %; a friction that is nonlinear in speed then shifts the dead band by 10 %."""
 
 _MEAN_SLOPE = "the change of friction with speed across the moves, whatever its law"
 _COULOMB = "moves in service do not separate friction into F_c and F_v"
@@ -274,7 +274,7 @@ class FrictionChange:
     earliest, latest : int
         Interval of its time, ns since 1970 (UTC).
     ratio, low, high : float
-        Sliding friction after it over that before it, with its interval.
+        Sliding friction after the change over that before, with its interval.
     """
 
     earliest: int
@@ -286,20 +286,20 @@ class FrictionChange:
 
 @dataclass(frozen=True)
 class Evidence:
-    """What the moves since the last change of friction say together.
+    """Combined result of the moves since the last change of friction.
 
     Attributes
     ----------
     moves : int
-        Moves that are used.
+        Number of moves used.
     since, until : int
-        Begin of the first one and end of the last one, ns since 1970 (UTC); 0 without any.
+        Begin of the first move and end of the last, ns since 1970 (UTC); 0 without moves.
     parameters : mapping of str to Parameter
         ``sliding_friction``, ``static_friction``, ``spring_constant``, ``spring_preload``,
         ``viscous_friction``, ``dead_band`` (m), and ``coulomb_friction``, which moves in service
         do not determine.
     sliding_speed : float
-        Speed that the sliding friction belongs to, m/s.
+        Speed to which the sliding friction applies, m/s.
     changes : tuple of FrictionChange
         The declared changes that the ledger still shows, oldest first.
     """
@@ -313,7 +313,7 @@ class Evidence:
     values: Mapping[str, float] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        """Give the values of the parameters by name."""
+        """Collect the values of the parameters by name."""
         values = {name: one.value for name, one in self.parameters.items()}
         object.__setattr__(self, "values", values)
 
@@ -324,7 +324,7 @@ class Evidence:
 
     @property
     def is_known(self) -> bool:
-        """Whether there is a sliding friction."""
+        """Whether the sliding friction is known."""
         return math.isfinite(self.parameters["sliding_friction"].value)
 
 
@@ -340,12 +340,12 @@ def evidence_of(
     valve : Valve
         Gives the travel.
     settings : IdentificationSettings, optional
-        Its timing uncertainty, calibration, and fixed spring constant are used.
+        Gives timing uncertainty, calibration and fixed spring constant.
 
     Returns
     -------
     Evidence
-        Where the moves are too few, all its parameters are not identifiable, with the reason.
+        With too few moves, all parameters are not identifiable, with the reason.
     """
     settings = settings or IdentificationSettings()
     every = Moves.of(ledger)
@@ -372,7 +372,7 @@ def evidence_of(
 def _since_change(
     ledger: Sequence[Move], every: Moves, travel: float, timing: float
 ) -> tuple[int, tuple[FrictionChange, ...]]:
-    """Return the first move after the last change, and the changes that are declared."""
+    """Return the index of the first move after the last change, and the declared changes."""
     series = series_of(every, travel)
     if series is None:
         return 0, ()
@@ -388,7 +388,7 @@ def _since_change(
 
 
 def _lag_share(series: Series, every: Moves, begin: int, end: int) -> float:
-    """Return what a lag of 1 s adds to the friction of some blocks, as a share of it."""
+    """Return what a lag of 1 s adds to the friction of several blocks, as a share of it."""
     last = int(series.first[end]) if end < series.first.size else len(every)
     moves = every[int(series.first[begin]) : last]
     rate = float(np.average(moves.direction * moves.force_rate, weights=moves.distance))
@@ -396,7 +396,7 @@ def _lag_share(series: Series, every: Moves, begin: int, end: int) -> float:
 
 
 def _change(split: Split, origin: int, lag: float) -> FrictionChange:
-    """Return a change; a lag, which adds the same force to both frictions, is in its interval."""
+    """Return a change; its interval includes a lag, which adds the same force to both frictions."""
     earliest, latest = (origin + round(1e9 * time) for time in (split.earliest, split.latest))
     width = math.hypot(math.log(split.high / split.ratio), lag)
     ends = (split.ratio * math.exp(way * width) for way in (-1.0, 1.0))
@@ -444,7 +444,7 @@ def _parameters(balance: Balance, spring: float | None) -> dict[str, Parameter]:
         )
         for name, (value, slope) in numbers.items()
     }
-    # Kept where it holds zero too: it carries the friction from one speed to another.
+    # Kept even if its interval includes zero: it converts friction from one speed to another.
     slope = numbers["viscous_friction"][1]
     error, width = balance.number(slope)
     found["viscous_friction"] = Parameter(
@@ -474,7 +474,7 @@ def _vague_spring(spring: float, share: float) -> str:
 
 
 def _doubt(balance: Balance, value: float, slope: NDArray[np.float64]) -> str:
-    """Return that the lag of the signals makes most of a wide interval, or nothing."""
+    """Return a remark if most of a wide interval is due to the lag of the signals, else ""."""
     _, width = balance.number(slope)
     lag = 2.0 * balance.timing * abs(float(slope @ balance.lag))
     if width <= WEAK_SHARE * abs(value) or 2.0 * lag**2 < width**2:

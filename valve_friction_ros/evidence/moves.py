@@ -7,10 +7,10 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Moves of the stem in service: cut from the samples as they arrive, each in a few numbers.
+"""Moves of the stem in service: cut from the arriving samples, each condensed to a few numbers.
 
-`MoveStream` takes samples and gives `Move`; `Moves` are many of them in columns. Before a move
-joins those that are kept, `stamp_problem` says whether its stamps can be believed.
+`MoveStream` turns samples into `Move` objects; `Moves` holds several in columns. `stamp_problem`
+checks the stamps of a move before it is stored.
 """
 
 import math
@@ -39,15 +39,15 @@ class Move:
 
         ∫ S_a·(P − P_ref) dx = k·(x₂² − x₁²)/2 + F_0·(x₂ − x₁) + F·|x₂ − x₁| .
 
-    Divided by x₂ − x₁ it is one linear equation: ``force`` = k·x̄ + F_0 ± F, with the mean
+    Division by x₂ − x₁ gives one linear equation: ``force`` = k·x̄ + F_0 ± F, with the mean
     position x̄ of the two ends.
 
     Attributes
     ----------
     begin, end : int
-        When it began and ended, ns since 1970 (UTC).
+        When the move began and ended, ns since 1970 (UTC).
     start, stop : float
-        Position of the stem before and after it, m.
+        Position of the stem before and after the move, m.
     force : float
         Mean force of the actuator over the distance, N.
     force_rate : float
@@ -55,8 +55,8 @@ class Move:
     speed : float
         Mean speed over the distance, ∫|v|·|dx| / ∫|dx|, m/s.
     onset_force, onset_position, onset_rate : float
-        Force (N), position (m) and rate of the force (N/s) when the stem broke away from a rest;
-        nan where there was no rest before.
+        Force (N), position (m) and rate of the force (N/s) when the stem broke away from rest;
+        nan if it did not rest before.
 
     Raises
     ------
@@ -76,7 +76,7 @@ class Move:
     onset_rate: float = math.nan
 
     def __post_init__(self) -> None:
-        """Refuse what is no move."""
+        """Refuse impossible numbers."""
         if not self.begin < self.end:
             raise ValueError(f"a move must end after it begins, got {self.begin} to {self.end} ns")
         for name in ("start", "stop", "force", "force_rate"):
@@ -102,7 +102,7 @@ class Moves:
     Attributes
     ----------
     time : ndarray of float
-        Seconds since the first one began, at the end of each.
+        End of each move, s after the first move began.
     """
 
     time: NDArray[np.float64]
@@ -145,7 +145,7 @@ class Moves:
         return self.time.size
 
     def __getitem__(self, chosen: slice | NDArray[np.bool_] | NDArray[np.intp]) -> "Moves":
-        """Return some of them."""
+        """Return a selection of the moves."""
         return Moves(*(getattr(self, field.name)[chosen] for field in fields(self)))
 
 
@@ -154,18 +154,18 @@ _DELAY = 10 * _MINUTE
 """Longest delay, ns, of a move whose stamps agree with the node's clock."""
 
 _CLOCK_IS_SET = 10**18
-"""Time, ns, of 2001-09-09: a clock that reads less is not set, or is that of a simulation."""
+"""Time, ns, of 2001-09-09: a clock that reads less is not set, or belongs to a simulation."""
 
 
 def stamp_problem(move: Move, last: int | None, now: int) -> str:
-    """Return why a move cannot join the kept ones; empty if it can.
+    """Return why a move cannot be stored after the kept moves; empty if it can.
 
     Parameters
     ----------
     move : Move
         A new move.
     last : int or None
-        End of the newest kept move, ns since 1970 (UTC); None without any.
+        End of the newest kept move, ns since 1970 (UTC); None without kept moves.
     now : int
         The node's clock, ns since 1970 (UTC).
     """
@@ -177,10 +177,10 @@ def stamp_problem(move: Move, last: int | None, now: int) -> str:
 
 
 def is_clock_reset(move: Move, last: int, now: int) -> bool:
-    """Return whether a move agrees with the clock, and the newest kept one lies ahead of both.
+    """Return whether a move agrees with the clock while the newest kept move is ahead of both.
 
-    Several such moves tell that the clock was ahead before. One tells little: a machine that has
-    just started may not have set its clock yet.
+    Several such moves show that the clock was ahead before. A single move shows little: a machine
+    that has just started may not have set its clock yet.
 
     Parameters
     ----------
@@ -198,40 +198,40 @@ def is_clock_reset(move: Move, last: int, now: int) -> bool:
 REST = 0.5
 """Time, s, over which a stem at rest does not move by more than the band of rest.
 
-Chosen: longer than the pause of a slip between two samples at 20 Hz, shorter than that between two
-set points."""
+Chosen: longer than the pause of a slip between two samples at 20 Hz, shorter than the pause between
+two set points."""
 
 _BAND_NOISE = 5.0
 _BAND_STEPS = 1.6
 _BAND_TRAVEL = 1.5e-3
-"""Band of rest: multiples of the noise (3.5 standard deviations of a difference) and of the step
-of a converter, and share of the travel."""
+"""Band of rest: multiples of the noise (3.5 standard deviations of a difference) and of the
+converter step, and share of the travel."""
 
 _LEAST_DISTANCE = 3.0
 """Least distance of a move, in bands of rest. Chosen: the ends are then known to a few percent."""
 
 _LONGEST_MOTION = 10.0
-"""Time, s, after which a motion without a rest is cut. So slow a stem has no kinetic energy that
-counts: at 10 mm/s, 1 kg has 5·10⁻⁵ J, and 100 N over 1 mm are 0.1 J."""
+"""Time, s, after which a motion without a rest is cut. The kinetic energy of so slow a stem is
+negligible: at 10 mm/s, 1 kg has 5·10⁻⁵ J, and 100 N over 1 mm are 0.1 J."""
 
 _GAP_PERIODS = 10
 _STOPS = 0.01
-"""Sampling periods beyond which a pause is a gap, and share of the travel at either stop in which
-the stem may be pressed onto it."""
+"""Sampling periods beyond which a pause is a gap; and distance from a stop, share of the travel,
+within which the stem may be pressed onto the stop."""
 
 _LAG = 0.05
-"""Shift, s, of the pressure by which its rate over the distance is measured."""
+"""Time shift, s, of the pressure that gives the rate of the force over the distance."""
 
 
 class Cut(NamedTuple):
-    """Moves of some samples.
+    """Moves cut from samples.
 
     Attributes
     ----------
     moves : tuple of Move
         Moves that have ended, oldest first.
     settled : int
-        Stamp, ns, before which no sample is needed any more.
+        Stamp, ns, before which samples are no longer needed.
     """
 
     moves: tuple[Move, ...]
@@ -239,7 +239,7 @@ class Cut(NamedTuple):
 
 
 class _Signals(NamedTuple):
-    """Force at the times of the positions: seconds from the first, N, m."""
+    """Position (m) and force (N), each at its own times, s after the first position."""
 
     origin: int
     time: NDArray[np.float64]
@@ -260,7 +260,7 @@ class _Signals(NamedTuple):
 
 
 def rest_band(position: NDArray[np.float64], travel: float) -> float:
-    """Return the displacement, m, that noise or a converter alone may show."""
+    """Return the displacement, m, that noise or a converter alone may cause."""
     step = quantisation_step(position)
     noise = math.hypot(position_noise(position), step / math.sqrt(12.0))
     least = _BAND_TRAVEL * travel if math.isfinite(travel) else 1e-3 * float(np.ptp(position))
@@ -273,7 +273,7 @@ def moves_in(pressure: Samples, position: Samples, valve: Valve, band: float) ->
     Parameters
     ----------
     pressure, position : Samples
-        Both signals; Pa and m.
+        Both signals, Pa and m.
     valve : Valve
         Gives area, reference and stops.
     band : float
@@ -282,8 +282,8 @@ def moves_in(pressure: Samples, position: Samples, valve: Valve, band: float) ->
     Returns
     -------
     Cut
-        The moves that have surely ended. A move with a gap in either signal is left out, and the
-        parts of a motion near a stop.
+        The moves that have certainly ended. Moves with a gap in either signal, and the parts of a
+        motion near a stop, are left out.
     """
     newest = int(min(pressure.stamps[-1], position.stamps[-1]))
     both = _signals(pressure, position, valve, newest)
@@ -328,7 +328,7 @@ def _signals(pressure: Samples, position: Samples, valve: Valve, newest: int) ->
 def _fresh(
     time: NDArray[np.float64], values: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Drop repeats of a held signal: they are late by half of the hold, in the mean."""
+    """Drop repeats of a held signal: on average they lag by half of the hold."""
     if time.size < StampedSignal.FEWEST:
         return time, values
     fresh = without_repeats(StampedSignal(time, values))
@@ -342,7 +342,7 @@ def _fresh(
 
 
 def _motions(both: _Signals, band: float) -> list[tuple[int, int]]:
-    """Return first and last sample of each motion: displaced by more than the band within REST."""
+    """Return first and last sample of each motion: more than the band of rest within `REST`."""
     time, position = both.time, both.position
     before = np.searchsorted(time, time - 0.5 * REST)
     after = np.minimum(np.searchsorted(time, time + 0.5 * REST), time.size - 1)
@@ -352,9 +352,9 @@ def _motions(both: _Signals, band: float) -> list[tuple[int, int]]:
 
 
 def _moves_of(both: _Signals, first: int, last: int, valve: Valve, band: float) -> list[Move]:
-    """Return the moves of one motion: cut where it turns, and where it lasts too long.
+    """Return the moves of one motion, cut where it reverses and where it lasts too long.
 
-    One with a gap has none: years may lie in it, where a clock was set.
+    A motion with a gap yields no move: if a clock was set, the gap may span years.
     """
     found: list[Move] = []
     margin = 2
@@ -375,7 +375,7 @@ def _moves_of(both: _Signals, first: int, last: int, valve: Valve, band: float) 
 def _one_way(
     position: NDArray[np.float64], begin: int, end: int, band: float
 ) -> list[tuple[int, int]]:
-    """Split a motion where it turns by more than the band."""
+    """Split a motion where it reverses by more than the band."""
     part = position[begin : end + 1]
     way = 1.0 if part[-1] >= part[0] else -1.0
     ahead = way * part
@@ -433,7 +433,7 @@ def _move(
 
 
 def _speed(time: NDArray[np.float64], position: NDArray[np.float64]) -> float:
-    """Return the mean speed over the distance, between points 0.1 s apart where it can be."""
+    """Return the mean speed over the distance, between points 0.1 s apart if possible."""
     count = max(2, min(time.size, 1 + round(float(time[-1] - time[0]) / 0.1)))
     grid = np.linspace(time[0], time[-1], count)
     steps = np.diff(np.interp(grid, time, position))
@@ -443,7 +443,7 @@ def _speed(time: NDArray[np.float64], position: NDArray[np.float64]) -> float:
 def _onset(both: _Signals, begin: int, end: int, band: float) -> tuple[float, float, float]:
     """Return force, position and rate of the force when the stem leaves its rest.
 
-    It leaves between the last sample inside half a band and the next one.
+    It leaves between the last sample inside half a band and the next sample.
     """
     position = both.position[begin : end + 1]
     rest = float(np.mean(position[:2]))
@@ -457,23 +457,22 @@ def _onset(both: _Signals, begin: int, end: int, band: float) -> tuple[float, fl
 
 
 _BATCH = 1_000_000_000
-"""Nanoseconds of samples that are looked at together."""
+"""Duration of the samples that are processed together, ns."""
 
 _SHORTEST_PERIOD = 0.02
 """Sampling period, s, below which samples are averaged. Chosen: a stem slides for longer."""
 
 _PAUSE = 0.1
 _PAUSE_PERIODS = 10
-"""A pause of this many seconds, and of so many periods, is a gap."""
+"""A pause beyond both this time, s, and this number of sampling periods is a gap."""
 
 _MOST_WAITING = 50_000
-"""Samples that are looked at together at most, whatever their stamps."""
+"""Most samples that are processed together, whatever their stamps."""
 
 _BAND_MEMORY = 60.0
 _BAND_PERIOD = 10.0
 _BAND_FADING = 0.95
-"""The band of rest is read from the last minute, every ten seconds; a smaller one replaces it by
-and by."""
+"""The band of rest is updated from the last minute every ten seconds. It shrinks only gradually."""
 
 _SIGNALS = (Kind.PRESSURE, Kind.POSITION)
 _NOTHING = Samples.joined()
@@ -482,8 +481,8 @@ _NOTHING = Samples.joined()
 class MoveStream:
     """Cuts the samples of one valve into moves, in bounded memory.
 
-    Bad samples, gaps, and stamps that go back end a move without evidence. Of samples with the same
-    stamp the first counts.
+    Bad samples, gaps, and stamps that go back discard the unfinished move. Of several samples with
+    the same stamp, the first is used.
 
     Parameters
     ----------
@@ -499,7 +498,7 @@ class MoveStream:
 
     @property
     def size(self) -> int:
-        """Samples in memory."""
+        """Number of samples in memory."""
         parts = (*self._raw.values(), *self._kept.values())
         return self._held + sum(part.stamps.size for part in parts)
 
@@ -513,7 +512,7 @@ class MoveStream:
         self._kept = dict.fromkeys(_SIGNALS, _NOTHING)
 
     def take(self, arrivals: Arrivals) -> tuple[Move, ...]:
-        """Take samples in the order in which they came; return the moves that have ended."""
+        """Take samples in the order of their arrival; return the moves that have ended."""
         if not arrivals.stamps.size:
             return ()
         self._waiting.append(arrivals)
@@ -535,7 +534,7 @@ class MoveStream:
         return moves
 
     def _trim(self) -> None:
-        """Drop what has waited too long for the other signal."""
+        """Drop samples that have waited too long for the other signal."""
         for kind, kept in self._kept.items():
             if kept.stamps.size:
                 oldest = int(kept.stamps[-1]) - round(1e9 * _BAND_MEMORY)
@@ -543,7 +542,7 @@ class MoveStream:
                 self._kept[kind] = Samples(kept.stamps[first:], kept.values[first:])
 
     def _extended(self, arrivals: Arrivals) -> bool:
-        """Add samples; tell whether there is no fault in them."""
+        """Add samples; return whether they are free of faults."""
         if np.any(arrivals.kinds == Kind.NO_POSITION):
             return False
         for kind in _SIGNALS:
