@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Streams of samples: what arrives, what is buffered, and the uniform record of both; no ROS."""
+"""Streams of samples: arrivals, buffers, data quality and the uniform record; no ROS."""
 
 from typing import TYPE_CHECKING
 

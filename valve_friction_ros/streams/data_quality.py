@@ -7,12 +7,13 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Whether the samples of a valve can be used: faults of the data, with their numbers.
+"""Quality of the samples of a valve: faults of the data, with their numbers.
 
-`DataQuality` sees each arrival, what became of it, and the clocks. It judges by arrivals alone: a
-sensor that reports seldom, and a stem that stands still, are no faults. What a signal advances from
-one look to the next is allowed between both, so a recording may be played at any speed.
-`LossCounter` counts messages that never arrived, by the numbers that their publishers gave them.
+`DataQuality` sees each arrival, whether it was accepted, and the clocks. It judges by arrivals
+alone: a sensor that reports rarely and a stem at rest are no faults. The stamps of both signals may
+differ by as much as a signal advances from one look to the next, so a recording may be played at
+any speed. `LossCounter` counts messages that never arrived, by the sequence numbers of their
+publishers.
 """
 
 import math
@@ -32,24 +33,24 @@ from valve_friction_ros.streams.samples import MOST_POSITION, Arrivals, Kind
 from valve_friction_ros.wording import Code, Statement, said
 
 _LOSS_HORIZON = 60.0
-"""Time, s, over which the share of lost messages is told."""
+"""Time, s, over which the share of lost messages is reported."""
 _MOST_A_SECOND = 1e6
-"""Messages a second of one publisher beyond which a jump of the numbers is another publisher's."""
+"""Messages per second of one publisher. A jump of the numbers beyond it means another publisher."""
 _MOST_PUBLISHERS = 16
-"""Publishers of a stream that are told apart; then the one that was silent longest is forgotten."""
+"""Most publishers that are tracked per stream; beyond it the longest silent is forgotten."""
 
 
 class Losses(NamedTuple):
-    """Messages of a stream.
+    """Lost messages of a stream.
 
     Attributes
     ----------
     lost : int
-        Those that were published and never taken, in all.
+        Number of messages that were published but not received, in total.
     recently_lost, recently_taken : int
-        Those of the last minute.
+        Number of messages lost and received in the last minute.
     silence : float
-        Time since the last loss was seen, s; infinite without any.
+        Time since the last loss was detected, s; infinite without losses.
     """
 
     lost: int = 0
@@ -59,36 +60,36 @@ class Losses(NamedTuple):
 
     @property
     def share(self) -> float:
-        """Lost messages over all that were published in the last minute; 0 without any."""
+        """Lost over published messages in the last minute; 0 without messages."""
         published = self.recently_lost + self.recently_taken
         return self.recently_lost / published if published else 0.0
 
 
 @dataclass
 class _Publisher:
-    """The next number that is expected of a publisher, and when the last one was seen, s."""
+    """The next number expected from a publisher, and when its last message was seen, s."""
 
     expected: int
     seen: float
 
 
 class LossCounter:
-    """Counts the messages that are missing between those that were taken.
+    """Counts the messages missing between received messages.
 
-    Each publisher numbers its messages one by one. Which publisher a message is of is not told, so
-    a number is that of the publisher which comes closest below it; one that no publisher could have
-    reached, or that lies below all, is the first of another publisher.
+    Each publisher numbers its messages consecutively, but a message does not name its publisher. A
+    number is therefore assigned to the publisher whose expected number is closest below it. A
+    number that no publisher could have reached, or that is below all, starts another publisher.
     """
 
     def __init__(self) -> None:
         self._publishers: list[_Publisher] = []
         self._recent: deque[list[float]] = deque()
-        """Of each second of the last minute: its begin, s, and the lost and the taken messages."""
+        """For each second of the last minute: begin, s, lost messages and received messages."""
         self._lost = 0
         self._last_loss: float | None = None
 
     def take(self, numbers: Sequence[int], now: float) -> None:
-        """Take the numbers of messages in the order in which they came, at the time `now`, s."""
+        """Take the numbers of messages in the order of arrival, at the time `now`, s."""
         if not numbers:
             return
         lost = 0
@@ -107,7 +108,7 @@ class LossCounter:
             self._lost, self._last_loss = self._lost + lost, now
 
     def _are_next(self, numbers: Sequence[int], now: float) -> bool:
-        """Take the numbers of a single publisher without a loss; tell if that is what they are."""
+        """Take numbers if they come from a single publisher without a loss; return whether so."""
         one = self._publishers[0] if len(self._publishers) == 1 else None
         if (
             one is None
@@ -123,10 +124,10 @@ class LossCounter:
             self._recent.popleft()
 
     def _followed(self, first: int, last: int, now: float) -> int:
-        """Take a piece of numbers; return how many are missing before it."""
+        """Take consecutive numbers; return how many are missing before the first."""
         known = [one for one in self._publishers if one.expected <= first]
         one = max(known, key=lambda one: one.expected, default=None)
-        # What comes within one look was sent since the look before.
+        # Messages that arrive within one look were sent since the previous look.
         if one is None or first - one.expected > _MOST_A_SECOND * max(now - one.seen, 1e-3):
             if len(self._publishers) >= _MOST_PUBLISHERS:
                 self._publishers.remove(min(self._publishers, key=lambda one: one.seen))
@@ -136,7 +137,7 @@ class LossCounter:
         return missing
 
     def forget(self) -> None:
-        """Forget the publishers: what comes next is the first of each; the counts stay."""
+        """Forget the publishers but keep the counts: each publisher starts anew."""
         self._publishers.clear()
 
     def losses(self, now: float) -> Losses:
@@ -153,61 +154,61 @@ class LossCounter:
 
 
 _HORIZON = 2.0
-"""Time, s, over which shares of samples are taken. Chosen: a fault is known within it, and over
-after it."""
+"""Time, s, over which shares of samples are taken. Chosen: a fault appears within this time, and
+disappears after it."""
 
 _BEGINS, _ENDS = 0.05, 0.01
-"""Share of bad samples from which it is a fault, and below which the fault is over. Chosen: a rare
-glitch is none."""
+"""Share of bad samples from which a fault begins, and below which it ends. Chosen: a rare glitch is
+not a fault."""
 
 _OUTSIDE = 0.05
-"""Distance beyond a stop, over the travel, from which a position lies outside, as in a record."""
+"""Distance beyond a stop, over the travel, from which a position is outside, as in a record."""
 
 _LASTS = 1.0
-"""Time, s, for which stamps must be wrong before it is a fault: a node that was held up takes old
-samples first."""
+"""Time, s, for which stamps must be wrong before this is a fault: a node that was blocked first
+takes old samples."""
 
 _APART = 1.0
-"""Distance, s, between the stamps of both signals that transport explains, beyond what a signal
-advances from one look to the next. Chosen: a bus delays a signal by less."""
+"""Difference, s, between the stamps of both signals that transport can explain, beyond the advance
+of a signal from one look to the next. Chosen: a bus delays a signal by less."""
 
 _TOGETHER = 1.0
 """Longest time, s, between arrivals of both signals whose stamps are compared."""
 
 
 class FaultKind(Enum):
-    """What may be wrong with the data of a valve."""
+    """Kind of a data fault of a valve."""
 
     REJECTED = "rejected"
     """Samples of a signal are rejected."""
     OUTSIDE_TRAVEL = "outside travel"
     """Positions lie outside the travel of the valve."""
     SKEW = "skew"
-    """The stamps of both signals are apart."""
+    """The stamps of the two signals differ."""
     CLOCK = "clock"
-    """Stamps are apart from the node's clock."""
+    """Stamps differ from the node's clock."""
 
 
 @dataclass(frozen=True)
 class DataFault:
-    """One fault of the data.
+    """A fault of the data.
 
     Attributes
     ----------
     kind : FaultKind
-        What is wrong.
+        Kind of the fault.
     signal : Signal or None
-        The signal that it is about; None: both.
+        The signal concerned; None for both.
     cause : SampleFault or None
-        Why most of the samples are rejected, where they are.
+        Most frequent cause of rejected samples, if any are rejected.
     share : float
-        Share of the signal's samples of the last seconds that are bad.
+        Share of bad samples of the signal in the last seconds.
     unusable : float
-        Time since the last usable sample of the signal, s; inf: there was none.
+        Time since the last usable sample of the signal, s; inf if there was none.
     seconds : float
-        How far stamps are ahead, s: of the clock, or those of the stem of those of the pressure.
+        Lead of the stamps, s: over the clock, or of the stem's over those of the pressure.
     reading : float
-        The worst reading, Pa or m; nan where none is bad.
+        The latest bad reading, Pa or m; nan if none is bad.
     """
 
     kind: FaultKind
@@ -225,7 +226,7 @@ class DataFault:
 
     @property
     def what(self) -> Statement:
-        """What is wrong, which does not change while it lasts."""
+        """What is wrong; unchanged while the fault lasts."""
         signal = None if self.signal is None else self.signal.value
         cause = None if self.cause is None else self.cause.name
         return said(Code.DATA_FAULT, signal=signal, cause=cause, kind=self.kind.name)
@@ -233,7 +234,7 @@ class DataFault:
     def statement(self, valve: Valve, joint: str = "") -> Statement:
         """Return what is wrong, where, and the remedy.
 
-        An empty `joint` is the first one.
+        An empty `joint` means the first joint.
         """
         signal = None if self.signal is None else self.signal.value
         if self.kind is FaultKind.REJECTED:
@@ -288,14 +289,14 @@ class _SignalQuality:
         self._batches: deque[_Batch] = deque()
         self._is_bad = dict.fromkeys((FaultKind.REJECTED, FaultKind.OUTSIDE_TRAVEL), False)
         self.usable = math.nan
-        """When the last usable sample came, s of the steady clock."""
+        """When the last usable sample arrived, s of the steady clock."""
         self.reading = math.nan
-        """The latest reading that was out of range, or outside the travel."""
+        """The latest reading out of range or outside the travel."""
         self.stamp: int | None = None
         self.stamp_time = math.nan
-        """Stamp of the newest arrival, ns, and when it came, s of the steady clock."""
+        """Stamp of the newest arrival, ns, and when it arrived, s of the steady clock."""
         self.advance = math.inf
-        """How far the stamps went on from the arrivals before to the latest ones, s."""
+        """Advance of the stamps from the previous to the latest arrivals, s."""
 
     def add(self, batch: _Batch) -> None:
         self._batches.append(batch)
@@ -310,7 +311,7 @@ class _SignalQuality:
         return math.inf if math.isnan(self.usable) else now - self.usable
 
     def faults(self, signal: Signal, now: float) -> Iterator[DataFault]:
-        """Yield what is wrong with the samples of the last seconds, else with the last ones."""
+        """Yield the faults of the samples of the last seconds, or else of the last arrivals."""
         while len(self._batches) > 1 and self._batches[0].time < now - _HORIZON:
             self._batches.popleft()
         total = sum(one.size for one in self._batches)
@@ -333,14 +334,14 @@ class _SignalQuality:
 
 
 class _Lasting:
-    """A distance of stamps that is a fault once arrivals have shown it for a while."""
+    """A difference of stamps that becomes a fault once arrivals have shown it for a while."""
 
     def __init__(self) -> None:
         self._since = self._last = math.nan
         self.seconds = math.nan
 
     def take(self, seconds: float, limit: float, now: float) -> None:
-        """Note a distance, s, that is too long beyond `limit`."""
+        """Note a difference, s, that is too large beyond `limit`."""
         if not abs(seconds) > limit:
             self._since = math.nan
             return
@@ -354,7 +355,7 @@ class _Lasting:
 
 
 class DataQuality:
-    """Finds what is wrong with the data of a valve.
+    """Finds the data faults of a valve.
 
     Parameters
     ----------
@@ -363,7 +364,7 @@ class DataQuality:
 
     Notes
     -----
-    Times of arrivals are those of a steady clock, s; `clock` is the node's, ns.
+    Times of arrivals are on a steady clock, s; `clock` is the node's time, ns.
     """
 
     def __init__(self, valve: Valve) -> None:
@@ -385,15 +386,15 @@ class DataQuality:
         Parameters
         ----------
         arrivals : Arrivals
-            What arrived.
+            The samples that arrived.
         intake : Intake
-            What became of it.
+            Which of the samples were rejected.
         now : float
             Steady time, s.
         clock : int, optional
-            Time of the node, ns; None: it is not comparable.
+            Time of the node, ns; None if it cannot be compared.
         tolerance : float
-            How far stamps may be apart from the clock, s; 0: any distance.
+            Largest difference between stamps and clock, s; 0 for no limit.
         """
         for signal, quality in self._signals.items():
             mine = (arrivals.kinds == Kind.PRESSURE) == (signal is Signal.PRESSURE)
@@ -418,7 +419,7 @@ class DataQuality:
             outside = 0
         else:
             margin = _OUTSIDE * self.valve.travel if math.isfinite(self.valve.travel) else math.inf
-            possible = np.abs(values) <= MOST_POSITION  # not so where it is nan
+            possible = np.abs(values) <= MOST_POSITION  # False for nan
             beyond = possible & ((values < -margin) | (values > self.valve.travel + margin))
             bad = beyond | (np.isfinite(values) & ~possible)
             outside = int(np.count_nonzero(beyond))
@@ -427,7 +428,7 @@ class DataQuality:
         return outside
 
     def _compare(self, now: float) -> None:
-        """Compare the newest stamps of both signals, where they came at one time."""
+        """Compare the newest stamps of both signals if they arrived together."""
         pressure, stem = (self._signals[signal] for signal in (Signal.PRESSURE, Signal.POSITION))
         if pressure.stamp is None or stem.stamp is None:
             return
@@ -439,20 +440,20 @@ class DataQuality:
         self._skew.take(apart, limit, now)
 
     def forget_stamps(self) -> None:
-        """Forget how stamps compare, as after a jump of the clock."""
+        """Forget the comparison of stamps, for example after a jump of the clock."""
         for quality in self._signals.values():
             quality.stamp, quality.advance = None, math.inf
         self._skew = _Lasting()
         self._clocks = {signal: _Lasting() for signal in Signal}
 
     def unusable(self, signal: Signal, now: float) -> float:
-        """Return the time since the last usable sample of a signal, s; inf: there was none."""
+        """Return the time since the last usable sample of a signal, s; inf if there was none."""
         return self._signals[signal].unusable(now)
 
     def faults(self, now: float, is_played: bool = False) -> tuple[DataFault, ...]:
-        """Return what is wrong now.
+        """Return the present faults.
 
-        The stamps of a recording that is played are not compared with the clock.
+        The stamps of a played recording are not compared with the clock.
         """
         found = [
             fault

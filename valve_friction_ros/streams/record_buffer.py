@@ -33,8 +33,8 @@ from valve_friction_ros.streams.samples import (
 from valve_friction_ros.wording import Code, Statement, said
 
 _REJECTIONS_KEPT = 10_000
-"""Rejections in memory. Chosen: ten seconds at 1 kHz, so a broken sensor does not fill the
-memory."""
+"""Most rejections in memory. Chosen: ten seconds at 1 kHz, so that a broken sensor does not fill
+the memory."""
 
 
 class Signal(Enum):
@@ -45,7 +45,7 @@ class Signal(Enum):
 
     @classmethod
     def of(cls, kind: int) -> "Signal":
-        """Return the signal that an arrival of a kind belongs to."""
+        """Return the signal of an arrival by its kind."""
         return cls.PRESSURE if kind == Kind.PRESSURE else cls.POSITION
 
 
@@ -53,31 +53,31 @@ class SampleFault(Enum):
     """Why a sample is rejected."""
 
     DAMAGED = "damaged"
-    """No message of the topic's type: it has neither stamp nor value."""
+    """Not a message of the topic's type: it has neither stamp nor value."""
     NO_JOINT = "no joint"
     NOT_FINITE = "not finite"
     OUT_OF_RANGE = "out of range"
     REPEATED = "repeated"
     OVERTAKEN = "overtaken"
-    """Its stamp is a little before the last one, which costs this sample alone."""
+    """Its stamp is slightly before the last one; only this sample is dropped."""
     BACK = "back"
-    """Its stamp goes back, which clears the buffer."""
+    """Its stamp goes back further, which clears the buffer."""
 
 
 class Rejection(NamedTuple):
-    """A rejected sample: its stamp (ns) and the cause."""
+    """A rejected sample: stamp (ns) and cause."""
 
     stamp: int
     cause: Statement
 
 
 class Intake(NamedTuple):
-    """What became of arrivals.
+    """Result of taking arrivals into the buffer.
 
     Attributes
     ----------
     rejected : mapping of (Signal, SampleFault) to int
-        Samples that were rejected.
+        Number of rejected samples.
     cleared : Statement or None
         Cause of the first clearing of the buffer.
     """
@@ -87,9 +87,9 @@ class Intake(NamedTuple):
 
 
 class Snapshot(NamedTuple):
-    """A copy of a buffer, to identify while the buffer takes further samples.
+    """A copy of a buffer, for an identification while the buffer takes further samples.
 
-    `cleared_because` is the cause of the last clearing, until the buffer is full again.
+    `cleared_because` gives the cause of the last clearing until the buffer is full again.
     """
 
     pressure: Samples
@@ -98,17 +98,17 @@ class Snapshot(NamedTuple):
     cleared_because: Statement | None
 
     def causes(self) -> str:
-        """Return the causes of the rejections, with the number of samples of each."""
+        """Return the causes of the rejections, with the number of samples for each."""
         counts = Counter(rejection.cause for rejection in self.rejections)
         return "; ".join(f"{cause} ({count} samples)" for cause, count in counts.items())
 
     def thinned(self, most: int) -> "tuple[Snapshot, int]":
-        """Return a snapshot of `most` samples of each signal at most, and how many make a mean.
+        """Return a snapshot with at most `most` samples per signal, and the samples per mean.
 
-        Where a signal has more, each `n` of its samples that follow each other are replaced by
-        their mean (`Samples.averaged`), `n` the least number that suffices; of both signals the
-        time that both cover is left. A signal that has no more stays as it is. Where both have the
-        same stamps, so have their means.
+        If a signal has more, each `n` successive samples are replaced by their mean
+        (`Samples.averaged`), with the smallest `n` that suffices. Both signals are cut to the time
+        that both cover. A signal with no more than `most` samples is not averaged. Signals with
+        equal stamps keep equal stamps.
         """
         pressure, position = self.pressure, self.position
         longest = max(pressure.stamps.size, position.stamps.size)
@@ -126,8 +126,8 @@ class Snapshot(NamedTuple):
     def recording(self) -> Recording:
         """Put both signals on one time grid.
 
-        Raises RefusalError if samples were rejected within the window, or the signals do not make a
-        record.
+        Raises RefusalError if samples were rejected within the window, or the signals cannot form
+        a record.
         """
         if self.rejections:
             raise RefusalError(
@@ -153,9 +153,10 @@ def _cause(signal: Signal, fault: SampleFault, **facts: Statement) -> Statement:
 class RecordBuffer:
     """The last `window` seconds of pressure and stem position of one valve.
 
-    An impossible sample, such as a pressure outside the sensor's range, is rejected and kept with
-    its cause. A stamp that goes back means that the clock has jumped, and clears the buffer; one
-    that goes back by 1.5 sampling periods at most was overtaken on its way, and is left out alone.
+    An impossible sample, such as a pressure outside the sensor's range, is rejected and recorded
+    with its cause. A stamp that goes back means that the clock has jumped, and clears the buffer.
+    A stamp that goes back by at most 1.5 sampling periods was overtaken in transport; only that
+    sample is dropped.
     """
 
     def __init__(self, valve: Valve, window: float) -> None:
@@ -175,27 +176,27 @@ class RecordBuffer:
 
     @property
     def counts(self) -> tuple[int, int]:
-        """Numbers of pressures and of positions."""
+        """Number of pressure samples and of position samples."""
         return len(self._pressure), len(self._position)
 
     @property
     def taken(self) -> int:
-        """Samples of both signals that were taken in all, also those that have left the window."""
+        """Number of samples of both signals taken in total, including those before the window."""
         return self._taken
 
     @property
     def rejected(self) -> Mapping[Statement, int]:
-        """Samples that were rejected in all, by their cause."""
+        """Number of samples rejected in total, by cause."""
         return MappingProxyType(self._rejected)
 
     @property
     def nbytes(self) -> int:
-        """Memory that the samples of both signals take, bytes."""
+        """Memory used by the samples of both signals, bytes."""
         return self._pressure.nbytes + self._position.nbytes
 
     @property
     def last_stamps(self) -> tuple[int | None, int | None]:
-        """Stamps of the newest pressure and of the newest position, ns, or None."""
+        """Stamps of the newest pressure and the newest position, ns, or None."""
         return self._pressure.last_stamp, self._position.last_stamp
 
     @property
@@ -217,7 +218,7 @@ class RecordBuffer:
         return cause
 
     def in_order(self, arrivals: Arrivals) -> Arrivals:
-        """Leave out the samples that were overtaken on their way, and count them as rejected."""
+        """Leave out samples that were overtaken in transport, and count them as rejected."""
         found = np.zeros(arrivals.stamps.size, np.bool_)
         for kind, signal, buffer in (
             (Kind.PRESSURE, Signal.PRESSURE, self._pressure),
@@ -233,10 +234,10 @@ class RecordBuffer:
         return Arrivals(kinds[~found], stamps[~found], values[~found])
 
     def add_arrivals(self, arrivals: Arrivals) -> Intake:
-        """Take samples of both signals in the order in which they came.
+        """Take samples of both signals in the order of their arrival.
 
         Arrivals without a fault are taken as a whole. Otherwise each sample is taken or rejected by
-        the methods above, because the samples that a clearing leaves depend on their order.
+        itself, because the order decides which samples remain after a clearing.
         """
         pressure, position = arrivals.samples(Kind.PRESSURE), arrivals.samples(Kind.POSITION)
         lowest, highest = self._valve.readings
@@ -268,14 +269,14 @@ class RecordBuffer:
         return Intake(rejected, cleared)
 
     def drop_damaged(self, signal: Signal, count: int) -> Intake:
-        """Count messages of a signal's topic that hold no sample."""
+        """Count messages on the topic of a signal that hold no sample."""
         self._rejected[_cause(signal, SampleFault.DAMAGED)] += count
         return Intake({(signal, SampleFault.DAMAGED): count})
 
     def _add(
         self, signal: Signal, stamp: int, value: float | None
     ) -> tuple[SampleFault | None, Statement | None]:
-        """Take a sample; return the fault for which it is rejected, and the cause."""
+        """Take a sample, or return the fault for which it is rejected and the cause."""
         buffer = self._pressure if signal is Signal.PRESSURE else self._position
         last = buffer.last_stamp
         if value is None:
@@ -306,7 +307,7 @@ class RecordBuffer:
         return None, None
 
     def bounds(self, signal: Signal) -> tuple[float, float]:
-        """Return the lowest and the highest reading that is taken, Pa or m."""
+        """Return the lowest and the highest accepted reading, Pa or m."""
         if signal is Signal.PRESSURE:
             return self._valve.readings
         return -MOST_POSITION, MOST_POSITION

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Stamped samples: as they arrive, in columns, in a buffer, and on one uniform time grid."""
+"""Stamped samples: on arrival, in columns, in a buffer, and on a uniform time grid."""
 
 import math
 from collections import deque
@@ -31,11 +31,11 @@ _CHUNK = 1024
 """Samples that are kept and dropped together. Chosen: about 1 s at 1 kHz."""
 
 _FEWEST_RECENT = 100
-"""Stamps that the sampling period is the median of, if there are as many. Chosen."""
+"""Least stamps for the median sampling period, if so many exist. Chosen."""
 
 _OVERTAKEN_PERIODS = 1.5
-"""Sampling periods by which a stamp may go back without a jump of the clock: two neighbours that
-changed places on their way, with jitter, go back by one."""
+"""Sampling periods by which a stamp may go back without a jump of the clock: two neighbours swapped
+in transport go back by one period, plus jitter."""
 
 _LONGEST_OFFSET = int(np.iinfo(np.uint32).max)
 
@@ -46,31 +46,31 @@ def nanoseconds(seconds: float) -> int:
 
 
 class Samples(NamedTuple):
-    """Part of a stamped signal: times, ns, increasing, and values, SI units, shape (n,) each."""
+    """Part of a stamped signal: increasing times, ns, and values, SI units, shape (n,) each."""
 
     stamps: NDArray[np.int64]
     values: NDArray[np.float64]
 
     @classmethod
     def joined(cls, *parts: "Samples") -> "Samples":
-        """Join parts that follow each other; none are an empty one."""
+        """Join successive parts; without parts the result is empty."""
         return cls(
             np.concatenate([np.empty(0, np.int64), *(part.stamps for part in parts)]),
             np.concatenate([np.empty(0), *(part.values for part in parts)]),
         )
 
     def within(self, begin: int, end: int) -> "Samples":
-        """Return those from `begin` to `end`, ns, both included."""
+        """Return the samples from `begin` to `end`, ns, both included."""
         first = int(np.searchsorted(self.stamps, begin))
         last = int(np.searchsorted(self.stamps, end, side="right"))
         return Samples(self.stamps[first:last], self.values[first:last])
 
     def averaged(self, count: int) -> "Samples":
-        """Return the means of each `count` samples that follow each other, at their mean stamps.
+        """Return the means of each `count` successive samples, at their mean stamps.
 
-        A motion at constant speed keeps its values at its times, so no signal is late against
-        another. The latest samples that do not fill a mean are left out, and so is a mean over more
-        than twice the time that so many samples take: it spans a pause.
+        A motion at constant speed keeps its values at its times, so averaging adds no lag between
+        signals. The last samples are left out if they do not fill a mean. A mean over more than
+        twice the usual time spans a pause, and is left out too.
         """
         means = self.stamps.size // count
         if count <= 1 or not means:
@@ -88,7 +88,7 @@ def _array(numbers: range) -> NDArray[np.int64]:
 
 
 class _Chunk(NamedTuple):
-    """Consecutive samples, their stamps as offsets (ns) from the first; a step alone if even."""
+    """Consecutive samples, with stamps as offsets (ns) from the first; a range if evenly spaced."""
 
     first: int
     last: int
@@ -122,9 +122,9 @@ class _Chunk(NamedTuple):
 class SampleBuffer:
     """The last `window` seconds of one signal, in bounded memory.
 
-    A sample takes 8 bytes where 1024 stamps are evenly spaced to the nanosecond, else 12, or 16
-    where they last longer than the 4.29 s that 32 bits of nanoseconds hold; at most 1024 samples
-    older than the window are still in memory.
+    A sample takes 8 bytes if 1024 stamps are evenly spaced to the nanosecond. Otherwise it takes
+    12 bytes, or 16 if the 1024 stamps span more than the 4.29 s that 32 bits of nanoseconds hold.
+    At most 1024 samples older than the window remain in memory.
     """
 
     def __init__(self, window: float) -> None:
@@ -140,7 +140,7 @@ class SampleBuffer:
 
     @property
     def nbytes(self) -> int:
-        """Memory that the samples take, bytes."""
+        """Memory used by the samples, bytes."""
         opened = sum(part.nbytes for part in self._open)
         return opened + sum(chunk.nbytes for chunk in self._closed)
 
@@ -186,7 +186,7 @@ class SampleBuffer:
             self._closed.popleft()
 
     def _begin(self) -> int:
-        """Return the stamp with which the last window begins."""
+        """Return the stamp at which the last window begins."""
         return 0 if self._last_stamp is None else self._last_stamp - self._window
 
     def _outside(self) -> int:
@@ -200,9 +200,9 @@ class SampleBuffer:
         return outside + int(np.searchsorted(self._open.stamps[: self._filled], begin))
 
     def overtaken(self, stamps: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """Tell which of the next stamps, ns, are a little before a stamp that came earlier.
+        """Return which of the next stamps, ns, are slightly before a stamp that arrived earlier.
 
-        A little is 1.5 sampling periods, of the median that these and the last stamps have.
+        Slightly means by at most 1.5 sampling periods, the median of these and the last stamps.
         """
         found = np.zeros(stamps.size, np.bool_)
         if not stamps.size:
@@ -220,7 +220,7 @@ class SampleBuffer:
         return found
 
     def _recent(self) -> NDArray[np.int64]:
-        """Return the last stamps, at most 1024 and at least as many as there are up to 100."""
+        """Return the last stamps: at most 1024, and at least 100 if so many exist."""
         filled = self._open.stamps[: self._filled]
         if self._filled < _FEWEST_RECENT and self._closed:
             return np.concatenate((self._closed[-1].stamps[-_FEWEST_RECENT:], filled))
@@ -243,11 +243,11 @@ COLUMNS = ("time", "pressure", "position")
 
 
 MOST_POSITION = 10.0
-"""Largest reading of a stem position, m, either way. Chosen: the longest pistons of control valves
-travel 0.6 m, the gates of dams some metres, and a sensor's zero may lie elsewhere."""
+"""Largest magnitude of a stem position, m. Chosen: the longest pistons of control valves travel
+0.6 m, the gates of dams some metres, and a sensor may have another zero."""
 
 _SECOND = 1_000_000_000
-"""Nanoseconds of a second."""
+"""Nanoseconds per second."""
 
 _LATEST_SECONDS = 9.2e9
 """Largest time, s, rounded down: 64 bits of nanoseconds hold 9.22e9 s."""
@@ -259,7 +259,7 @@ class Kind(IntEnum):
     PRESSURE = 0
     POSITION = 1
     NO_POSITION = 2
-    """A message of the stem without a position of the joint."""
+    """A stem message without a position of the joint."""
 
 
 class Arrivals(NamedTuple):
@@ -268,11 +268,11 @@ class Arrivals(NamedTuple):
     Attributes
     ----------
     kinds : ndarray of uint8, shape (n,)
-        A `Kind` for each.
+        The `Kind` of each sample.
     stamps : ndarray of int64, shape (n,)
         Times, ns.
     values : ndarray of float, shape (n,)
-        Pressures (Pa) and positions (m); nan where there is none.
+        Pressures (Pa) and positions (m); nan if missing.
     """
 
     kinds: NDArray[np.uint8]
@@ -281,12 +281,12 @@ class Arrivals(NamedTuple):
 
     @classmethod
     def joined(cls, parts: "Iterable[Arrivals]") -> "Arrivals":
-        """Join what arrived one after the other; none are an empty one."""
+        """Join successive arrivals; without parts the result is empty."""
         nothing = cls(np.empty(0, np.uint8), np.empty(0, np.int64), np.empty(0))
         return cls(*map(np.concatenate, zip(nothing, *parts, strict=True)))
 
     def plausible(self) -> "Arrivals":
-        """Return them with nan for positions that no valve has."""
+        """Return the arrivals with nan for positions that no valve can reach."""
         beyond = (self.kinds == Kind.POSITION) & (np.abs(self.values) > MOST_POSITION)
         if not beyond.any():
             return self
@@ -299,11 +299,11 @@ class Arrivals(NamedTuple):
 
 
 def rows_arrived(table: ArrayLike, labels: Sequence[str] = COLUMNS) -> Arrivals:
-    """Split a table into samples of both signals: of each row the pressure, then the position.
+    """Split a table into samples of both signals: from each row the pressure, then the position.
 
     The table has the shape (n, 3), one row per sample, and its `labels` are `COLUMNS`. A time is
     rounded to the finest decimal that floats of this size resolve: nanoseconds below 97 days,
-    microseconds for seconds since 1970. So a time of whole microseconds comes back exactly.
+    microseconds for seconds since 1970. A time of whole microseconds is therefore kept exactly.
 
     Raises ValueError if the table has another shape or other columns, or a time does not fit a
     64-bit clock.
@@ -331,7 +331,7 @@ def _stamps(seconds: NDArray[np.float64]) -> NDArray[np.int64]:
 
 
 _LARGEST_GAP = 10
-"""Sampling periods of a signal above which a pause is a gap; shorter pauses are interpolated.
+"""Sampling periods above which a pause is a gap; shorter pauses are interpolated.
 
 Chosen: at 100 Hz or faster such a pause is 0.1 s at most, short against a stroke."""
 
@@ -344,12 +344,15 @@ _LOW, _APART = 0.2, 0.3
 _FEWEST_CHANGES = 30
 _HEARTBEAT, _BAND = 0.5, 3.0
 _LONGEST_SILENCE = 600_000_000_000
-"""A signal is sent on change if none of its changes is below this share of their low quantile; a
-change after more than this share of the longest pause may be a sign of life. It was silent if it
-then differs by so many low quantiles at most, and for ten minutes at most, ns.
+"""Limits by which a signal is found to be sent on change, and by which its pauses are silences.
 
-Of a signal sampled by a clock 6 % of the changes are that small: chance leaves none among
-`_FEWEST_CHANGES` in 16 % of the records, and in 0.2 % among a hundred; both have no pauses."""
+A signal is sent on change if no change is below the share `_APART` of their `_LOW` quantile.
+Changes after more than the share `_HEARTBEAT` of the longest pause do not enter, since they may be
+signs of life. A pause is a silence if the value then differs by at most `_BAND` low quantiles, and
+if it lasts at most ten minutes, ns.
+
+In a signal sampled by a clock, 6 % of the changes are that small. By chance none is among
+`_FEWEST_CHANGES` in 16 % of the records, and among a hundred in 0.2 %; both have no pauses."""
 
 _ON_GRID = 1e-3
 """Distance of a stamp from the grid, as a share of its period, up to which the stamp is on it.
@@ -361,7 +364,8 @@ Chosen: at 1 kHz that is 1 µs, in which a stem at 0.1 m/s moves by 0.1 µm, bel
 class Gap:
     """The longest gap of signal `name`: `seconds` before `sample`, `since_start` s after the first.
 
-    All its gaps take a `share` of its time. As text it is a refusal with its remedy.
+    All gaps together take the `share` of the time of the signal. The text of a gap is a refusal
+    with its remedy.
     """
 
     name: str
@@ -384,9 +388,10 @@ class Gap:
 
 
 def _silences(samples: Samples) -> NDArray[np.bool_]:
-    """Return which pauses are no gaps: those of a sensor that sends only what has changed.
+    """Return which pauses are not gaps but silences of a sensor that sends only on change.
 
-    It sends what differs from its last value by a dead band, and is silent while its signal rests.
+    Such a sensor sends a value that differs from its last by a dead band, and is silent while its
+    signal rests.
     """
     pauses = np.diff(samples.stamps)
     changes = np.abs(np.diff(samples.values))
@@ -411,7 +416,7 @@ def _gap(name: str, samples: Samples, period: int) -> Gap | None:
 
 
 def _period(name: str, samples: Samples) -> int:
-    """Return the median sampling period in ns; refuse a signal that is empty."""
+    """Return the median sampling period, ns; refuse a signal with fewer than two samples."""
     if samples.stamps.size == 0:
         raise LittleMotionError(f"no samples of {name}: check that it is published on this topic")
     if samples.stamps.size == 1:
@@ -428,10 +433,9 @@ def uniform_recording(
 ) -> Recording:
     """Put drive and stem position on the time grid of the stem position.
 
-    The grid starts at the first position inside the time that both signals cover and runs at
-    the median period of the positions; both signals are interpolated linearly. Where
-    the positions are uniform already, their values stay unchanged to the last bit, and so do those
-    of the drive where it shares their stamps.
+    The grid starts at the first position within the time that both signals cover, and has the
+    median period of the positions. Both signals are interpolated linearly. Positions that are
+    already uniform keep their values to the last bit, and so does a drive with the same stamps.
 
     Parameters
     ----------
@@ -442,21 +446,22 @@ def uniform_recording(
     names : tuple of str
         Names of the two signals in a refusal.
     driven_by : Drive
-        What `drive` is.
+        Quantity of `drive`.
     refusal_of : callable
-        Puts a gap into words.
+        Returns the refusal of a gap.
 
     Returns
     -------
     Recording
-        Its `start_time` is the stamp of its first sample, s; `stamped` holds the samples where
-        their stamps are not the grid. `gap` names the longest pause of more than ten periods.
+        Its `start_time` is the stamp of the first sample, s. `stamped` holds the original samples
+        if their stamps are not on the grid. `gap` describes the longest pause of more than ten
+        periods.
 
     Raises
     ------
     RefusalError
         If a signal is empty or beyond any sensor, gaps take more than half of its time, or the two
-        do not overlap.
+        signals do not overlap.
     """
     period_of_drive = _period(names[0], drive)
     period = _period(names[1], position)
@@ -496,7 +501,7 @@ def uniform_recording(
 def _at_own_stamps(
     drive: Samples, position: Samples, origin: int, period: int, driven_by: Drive
 ) -> StampedRecord | None:
-    """Return both signals at their own stamps; None where these are the grid, or too few."""
+    """Return both signals at their own stamps; None if these are the grid, or too few."""
     signals = drive, position
     if min(samples.stamps.size for samples in signals) < StampedSignal.FEWEST:
         return None
@@ -524,7 +529,7 @@ DEFAULT_JOINT = "stem"
 def joint_index(names: Sequence[str], positions: int, joint: str) -> int | None:
     """Index of `joint` among `positions` positions; None if it is missing.
 
-    An empty name means the first joint; so does every name where the joints have no names.
+    An empty name means the first joint. So does any name if the joints have no names.
     """
     index = 0
     if joint and names:
@@ -535,9 +540,9 @@ def joint_index(names: Sequence[str], positions: int, joint: str) -> int | None:
 
 
 def joint_position(names: Sequence[str], positions: Sequence[float], joint: str) -> float | None:
-    """Position (m) of `joint`, of the first joint for an empty name; None if it is missing.
+    """Position (m) of `joint`, or of the first joint for an empty name; None if it is missing.
 
-    A message may leave out the names of its joints.
+    A message may omit the names of its joints.
     """
     index = joint_index(names, len(positions), joint)
     return None if index is None else positions[index]
