@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Many recordings identified by many processes into one file; no ROS."""
+"""Identification of many recordings by several processes into one file; no ROS."""
 
 from typing import TYPE_CHECKING
 

@@ -9,14 +9,14 @@
 
 """Tasks for the workers of a Dask cluster, which may die.
 
-What is sent is the name of a function and what it is given, pickled once more, so that only a
-worker opens it: the scheduler needs Dask and nothing of this package.
+Each message holds the name of a function and its arguments, pickled once more. Only a worker
+unpickles it, so the scheduler needs Dask but not this package.
 
-Answers are taken batch by batch and released, as Dask would do again the work of a dead worker
-whose answers are still wanted. What a dead worker had, Dask hands to another one, and gives up
-after `allowed-failures` deaths. A batch that is given up hides which of its tasks did it, and it
-takes those with it that waited beside it. So all these tasks are tried again one by one, at the
-end, with nothing beside them.
+Answers are taken and released batch by batch, since Dask repeats the work of a dead worker whose
+answers are still wanted. Dask hands the tasks of a dead worker to another worker, and gives up
+after `allowed-failures` deaths. A failed batch does not show which task killed its worker, and the
+batches that waited on the same worker fail with it. All these tasks are therefore tried again at
+the end, one by one and alone.
 """
 
 import asyncio
@@ -46,30 +46,30 @@ _Task = TypeVar("_Task")
 _Answer = TypeVar("_Answer")
 
 _COMPARED = ("numpy", "scipy", "numba", "distributed")
-"""Libraries whose version matters: those that calculate, as it may change the last digits."""
+"""Libraries whose versions are compared, since they may change the last digits of results."""
 
 _ALONE = threading.Lock()
-"""One batch at a time in a process: figures are drawn by a library that is not made for threads."""
+"""One batch at a time per process: the library that draws figures is not thread-safe."""
 
 
 class _Call:
-    """Becomes the value of a function where it is unpickled."""
+    """Unpickles to the return value of a function."""
 
     def __init__(self, function: Callable[..., Any], arguments: tuple[object, ...]) -> None:
         self._call = (function, arguments)
 
     def __reduce__(self) -> tuple[Callable[..., Any], tuple[object, ...]]:
-        """Give the call."""
+        """Return the call."""
         return self._call
 
 
 def call(function: Callable[..., Any], *arguments: object) -> bytes:
-    """Return bytes from which `pickle.loads` makes the value of a function, where it is called."""
+    """Return bytes from which `pickle.loads` calls a function and returns its value."""
     return pickle.dumps(_Call(function, arguments))
 
 
 def versions() -> dict[str, str]:
-    """Return the versions of this process that matter to results."""
+    """Return the versions in this process that may affect results."""
     found = {PACKAGE: __version__}
     for name in _COMPARED:
         with contextlib.suppress(metadata.PackageNotFoundError):
@@ -79,7 +79,7 @@ def versions() -> dict[str, str]:
 
 @contextlib.contextmanager
 def _drafts_of_worker() -> Iterator[None]:
-    """Have temporary files in the worker's folder, which Dask clears when the worker was killed."""
+    """Put temporary files into the worker's folder, which Dask clears if the worker is killed."""
     from distributed import get_worker  # noqa: PLC0415 - an extra
 
     before = tempfile.tempdir
@@ -93,11 +93,11 @@ def _drafts_of_worker() -> Iterator[None]:
 def answers(
     version: str, work: Callable[[_Task], _Answer], tasks: Sequence[_Task]
 ) -> list[_Answer]:
-    """Answer a batch, on a worker of the same version as whoever asks.
+    """Answer a batch on a worker with the package version of the caller.
 
-    Raises ImportError if it is another one.
+    Raises ImportError if the versions differ.
     """
-    if version != __version__:  # a worker that came after they were compared
+    if version != __version__:  # the worker joined after the comparison
         raise ImportError(f"{socket.gethostname()} has {PACKAGE} {__version__}")
     with _ALONE, _drafts_of_worker():
         return [work(task) for task in tasks]
@@ -105,11 +105,11 @@ def answers(
 
 _REMEDY = "run `pip install 'distributed>=2026.8'` (the extra `cluster`)"
 NO_WORKER = 30.0
-"""How long a worker is waited for while there is none, s."""
+"""Longest wait while there is no worker, s."""
 _AWAY = 10.0
-"""How long a scheduler is waited for, s."""
+"""Longest wait for a scheduler, s."""
 _CLOSING = 2.0
-"""How long the connection may take to close, s."""
+"""Longest time to close the connection, s."""
 
 
 class Cluster:
@@ -118,7 +118,7 @@ class Cluster:
     Attributes
     ----------
     address : str
-        Of its scheduler.
+        Address of its scheduler.
     client : distributed.Client
         The connection.
     """
@@ -128,25 +128,25 @@ class Cluster:
         self.client = client
 
     def gone(self) -> str:
-        """Say that the scheduler has gone."""
+        """Return the message that the scheduler has gone."""
         return f"{self.address}: the scheduler has gone: once it is back, the same command goes on"
 
     def differs(self, cause: str) -> str:
-        """Say that a worker cannot do the work."""
+        """Return the message that a worker cannot do the work."""
         return (
             f"{self.address}: a worker is unlike this machine ({cause}): install {PACKAGE} "
             f"{__version__} with the same extras on all of them"
         )
 
     def without_workers(self) -> str:
-        """Say that there is no worker."""
+        """Return the message that there is no worker."""
         return (
             f"{self.address}: no worker has come in {NO_WORKER:g} s: start some by "
             f"`dask worker {self.address} --nthreads 1`"
         )
 
     def require_scheduler(self) -> None:
-        """Refuse to go on without the scheduler."""
+        """Raise ValueError if the scheduler has gone."""
         if self.client.status != "running":
             raise ValueError(self.gone())
 
@@ -158,9 +158,9 @@ class Cluster:
             raise ValueError(self.gone()) from None
 
     def compare(self) -> list[str]:
-        """Refuse workers without this package or with another version of it; return other unlikes.
+        """Refuse workers without this package version; return a note per other difference.
 
-        Raises ValueError if there is no worker.
+        Raises ValueError if a worker is refused or there is none.
         """
         try:
             self.client.wait_for_workers(1, timeout=NO_WORKER)
@@ -184,7 +184,7 @@ class Cluster:
 
 
 async def _reach(address: str) -> None:
-    """Connect and part again: a `Client` that cannot connect leaves threads that may lock up."""
+    """Test the connection: a `Client` that fails to connect leaves threads that may lock up."""
     from distributed import Security  # noqa: PLC0415 - an extra
     from distributed.comm import connect  # noqa: PLC0415
 
@@ -196,9 +196,9 @@ async def _reach(address: str) -> None:
 def cluster_at(address: str) -> Iterator[Cluster]:
     """Connect to the scheduler of a Dask cluster, ``tcp://host:port`` or ``tls://host:port``.
 
-    Certificates and limits of time are those of Dask's own configuration.
+    Certificates and timeouts come from the configuration of Dask.
 
-    Raises ValueError, one line, if Dask is not installed, or the scheduler does not answer.
+    Raises ValueError, one line, if Dask is not installed or the scheduler does not answer.
     """
     try:
         import dask  # noqa: PLC0415 - an extra, and slow to import
@@ -221,13 +221,14 @@ def cluster_at(address: str) -> Iterator[Cluster]:
 
 
 _LOOK_UP, _COUNT = 0.1, 1.0
-"""How often the wish to stop is looked at, and the workers are counted, s."""
+"""Intervals at which a request to stop is checked, and at which workers are counted, s."""
 _LARGEST_BATCH = 16
-"""Most tasks handed out together: what handing out costs is then below a millisecond each."""
+"""Most tasks per batch: handing out then costs less than a millisecond per task."""
 _BATCHES_A_THREAD = 2
-"""Batches that a thread has or waits for: it never waits, and little is lost with it."""
+"""Batches assigned to a thread: it never waits, and its death loses little."""
 _SHARES = 4
-"""Batches get smaller to the end, so that all workers end together: each thread has some left."""
+"""Batches per thread into which the remaining tasks are divided: batches shrink towards the end, so
+that all workers finish together."""
 
 
 @dataclass(frozen=True)
@@ -238,7 +239,7 @@ class _Batch(Generic[_Task]):
 
 
 class _Run(Generic[_Task, _Answer]):
-    """The tasks of one call: those that wait, those handed out, and those under suspicion."""
+    """The tasks of one call: waiting, handed out, or suspected of killing a worker."""
 
     def __init__(
         self, cluster: Cluster, work: Callable[[_Task], _Answer], tasks: Iterable[_Task]
@@ -257,7 +258,7 @@ class _Run(Generic[_Task, _Answer]):
         return not (self._waiting or self._suspects or self._out)
 
     def _count_threads(self) -> None:
-        """Count the threads of the workers, now and then; refuse to wait for them without end."""
+        """Count the threads of the workers now and then; give up after too long without any."""
         now = time.monotonic()
         if now - self._counted < _COUNT:
             return
@@ -276,7 +277,7 @@ class _Run(Generic[_Task, _Answer]):
         future.add_done_callback(lambda done: self._ready.put(done.key))
 
     def fill(self) -> None:
-        """Hand out what the workers can hold."""
+        """Hand out as many batches as the workers can hold."""
         self._count_threads()
         while self._waiting and len(self._out) < _BATCHES_A_THREAD * self._threads:
             share = len(self._waiting) // (_SHARES * self._threads)
@@ -286,7 +287,7 @@ class _Run(Generic[_Task, _Answer]):
             self._hand_out([self._suspects.popleft()], is_alone=True)
 
     def answered(self) -> Iterator[tuple[_Task, _Answer | DeadWorker]]:
-        """Take the next batch that is done, if one is soon."""
+        """Yield the tasks and answers of the next finished batch; nothing after a short wait."""
         try:
             key = self._ready.get(timeout=_LOOK_UP)
         except Empty:
@@ -295,7 +296,7 @@ class _Run(Generic[_Task, _Answer]):
         batch = self._out[key]
         try:
             found: list[_Answer | DeadWorker] = batch.future.result(timeout=_COUNT)
-        except (TimeoutError, asyncio.TimeoutError):  # its worker died with it: it is done again
+        except (TimeoutError, asyncio.TimeoutError):  # its worker died, and Dask repeats the batch
             self._ready.put(key)
             return
         except ImportError as error:
@@ -314,13 +315,13 @@ class _Run(Generic[_Task, _Answer]):
         yield from zip(batch.tasks, found, strict=True)
 
     def cancel(self) -> None:
-        """Give up what is handed out."""
+        """Cancel the batches that are handed out."""
         with contextlib.suppress(Exception):
             self._cluster.client.cancel([batch.future for batch in self._out.values()], force=True)
 
 
 def _cause(error: Exception) -> str:
-    """Say in one line what became of a task that was tried by itself."""
+    """Return in one line why a task that was tried alone failed."""
     from distributed import KilledWorker  # noqa: PLC0415 - an extra
 
     if isinstance(error, KilledWorker):
@@ -341,10 +342,10 @@ def in_cluster(
 ) -> Iterator[tuple[_Task, _Answer | DeadWorker]]:
     """Yield tasks with their answers, or a `DeadWorker`, as they finish on a cluster's workers.
 
-    `work` is a function of a module that the workers have too. Once `stopped` returns True nothing
-    more is handed out, and what waits is given up; a worker ends the batch that it has.
+    `work` is a function of a module that the workers can import. Once `stopped` returns True, no
+    more tasks are handed out and waiting tasks are given up; a worker finishes its present batch.
 
-    Raises ValueError if the scheduler goes, no worker is left, or one cannot do the work.
+    Raises ValueError if the scheduler goes, no worker is left, or a worker cannot do the work.
     """
     run = _Run(cluster, work, tasks)
     try:

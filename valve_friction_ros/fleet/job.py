@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""One recording to identify, and the rows of its results."""
+"""Identification of one recording, and the rows of its results."""
 
 import contextlib
 import copy
@@ -67,11 +67,11 @@ from valve_friction_ros.streams.samples import nanoseconds
 from valve_friction_ros.wording import Code, said
 
 FILING = "filing"
-"""What a row holds beside its columns until it is filed."""
+"""Extra cell of a row until its result is filed."""
 
 
 def kept_valve(tag: str) -> KeptValve:
-    """Return the valve of a tag, under the name that its identifier on ROS would have."""
+    """Return the valve of a tag, under the name that its ROS identifier would have."""
     return KeptValve(f"/{re.sub(r'[^A-Za-z0-9]+', '_', tag).strip('_').lower()}/identifier", tag)
 
 
@@ -142,12 +142,12 @@ class Filing:
 
 @dataclass(frozen=True)
 class Filed:
-    """What came of filing.
+    """Outcome of filing.
 
     Attributes
     ----------
     filed, known : int
-        Results that were filed, and that had been before.
+        Number of results filed now, and of results filed before.
     baselines : tuple of str
         Tags whose first result became the baseline.
     cells : mapping of tuple of str to mapping of str to Cell
@@ -161,9 +161,9 @@ class Filed:
 
 
 def filed_before(place: Path, tags: Iterable[str]) -> set[tuple[str, int]]:
-    """Return what a history holds: tags with the second at which a record begins.
+    """Return the records in a history: tag, and second in which the record begins.
 
-    Raises HistoryError if it cannot be read.
+    Raises HistoryError if the history cannot be read.
     """
     if not place.exists():
         return set()
@@ -177,9 +177,9 @@ def filed_before(place: Path, tags: Iterable[str]) -> set[tuple[str, int]]:
 
 
 class _Alarms:
-    """Follows the alarms of a valve by the records that are filed, each at the time of its end.
+    """Updates the alarms of a valve from its filed records, each at the end of the record.
 
-    A record from before the last one that was filed tells nothing of now.
+    A record older than the last filed record does not change the alarms.
     """
 
     def __init__(self, history: HistoryFile, valve: KeptValve) -> None:
@@ -192,7 +192,7 @@ class _Alarms:
         self._hold = FrictionHold(shown, None if last is None else last.time)
 
     def follow(self, diagnosis: Diagnosis, findings: Iterable[Finding], filing: Filing) -> None:
-        """Take the diagnosis of a record, which is of the time at which the record ended."""
+        """Take the diagnosis of a record, dated at the end of the record."""
         time = filing.span.end
         if self._hold.until is not None and time <= self._hold.until:
             return
@@ -210,9 +210,9 @@ class _Alarms:
 
 
 def baseline_kept(place: Path | None, tag: str) -> Baseline | None:
-    """Return the baseline that a history holds of a tag, if there are any of these.
+    """Return the baseline of a tag from a history; None without history, tag or baseline.
 
-    Raises HistoryError if it cannot be read.
+    Raises HistoryError if the history cannot be read.
     """
     if place is None or not tag or not place.exists():
         return None
@@ -226,16 +226,16 @@ def file_results(place: Path, filings: Iterable[Filing], first_is_baseline: bool
     Parameters
     ----------
     place : Path
-        The history, a file; it is made if it is missing.
+        The history file, created if missing.
     filings : iterable of Filing
-        The results; one whose record is in the history already is left as it is.
+        The results; a record that is already in the history is not filed again.
     first_is_baseline : bool
         Whether the first result of a valve without a baseline becomes its baseline.
 
     Raises
     ------
     HistoryError
-        If it cannot be read or written.
+        If the history cannot be read or written.
     """
     history = HistoryFile(place)
     history.prepare()
@@ -294,9 +294,9 @@ def _begin(history: HistoryFile, valve: KeptValve, one: Filing) -> Baseline | No
 
 @dataclass(frozen=True)
 class Options:
-    """With what a recording is identified, and compared: `baselines` by the names of its valves.
+    """Options of the identification and comparison of a recording.
 
-    `tag` is that of its valve, where it is known.
+    `baselines` are keyed by the names of its valves. `tag` is the tag of its valve, if known.
     """
 
     valve: Valve
@@ -308,7 +308,7 @@ class Options:
     limits: FrictionLimits = field(default_factory=FrictionLimits)
 
     def fingerprint(self) -> str:
-        """Return a digest of all options and of the version of the package."""
+        """Return a digest of all options and of the package version."""
         apart = ("fixed", "stated")
         settings = [each for each in vars(self.settings).items() if each[0] not in apart]
         everything = (
@@ -328,11 +328,11 @@ class Options:
 
 @dataclass(frozen=True)
 class Job:
-    """A recording and how to identify it, to be handed to another process, here or elsewhere.
+    """A recording and how to identify it, for another process on this machine or elsewhere.
 
-    `name` is that of the recording in its folder; `reports` is where its reports will be written,
-    if they are wanted; `is_filed` asks for what a history keeps of the result, and `baseline` is
-    that of the history; `beside` are further files with signals of its valve.
+    `name` is the name of the recording in its folder. `reports` is the folder of its reports, if
+    wanted. `is_filed` requests the result for a history, and `baseline` comes from the history.
+    `beside` are further files with signals of its valve.
     """
 
     path: Path
@@ -347,7 +347,7 @@ class Job:
 def _report(
     job: Job, recorded: RecordedValve, result: Result, baseline: Baseline | None
 ) -> Mapping[str, Cell]:
-    """Make the report of a valve; it is written where the results are."""
+    """Return the report of a valve as cells; the process that collects the results writes it."""
     if job.reports is None:
         return {}
 
@@ -369,7 +369,7 @@ def _report(
 
 
 def _dated(job: Job, result: Result) -> str:
-    """Return how the name of a report begins by which the dashboard finds it; empty without tag."""
+    """Return the prefix by which the dashboard finds a report; empty without tag or date."""
     if not job.options.tag or result.recording.start_time < DATED:
         return ""
     stem = kept_valve(job.options.tag).name.strip("/").removesuffix("/identifier")
@@ -411,8 +411,8 @@ def _cells(job: Job, recorded: RecordedValve) -> Mapping[str, Cell]:
 def identify_job(job: Job) -> list[Mapping[str, Cell]]:
     """Read and identify a recording.
 
-    Returns the cells of a row for each valve, at least one, in the order of the file; a refusal has
-    its reason under ``error``. A page of a report goes with its row.
+    Returns the cells of one row per valve, at least one row, in the order of the file. A refusal
+    has its reason under ``error``. The page of a report is a cell of its row.
     """
     try:
         with contextlib.ExitStack() as fetched:
@@ -428,7 +428,7 @@ def identify_job(job: Job) -> list[Mapping[str, Cell]]:
 
 
 def identify_job_elsewhere(job: Job) -> list[Mapping[str, Cell]]:
-    """Do the same on another machine, which may not see the recording at all."""
+    """Identify a recording on another machine, which may not have access to it."""
     try:
         is_there = job.path.exists()
     except Exception:  # noqa: BLE001 - whoever reads it says what is the matter

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The valves of a plant in one table, and which recording is of which valve."""
+"""Table of the valves of a plant, and assignment of recordings to valves."""
 
 import csv
 import re
@@ -31,20 +31,20 @@ from valve_friction_ros.records.valve_file import ValveFile, valve_file_of
 
 _NUMBERS = {name: name for name in ("area", "travel", "opposing_area", "mass")}
 _NUMBERS |= {"spring": "spring_range", "range": "sensor_range"}
-"""Columns of numbers with units, and what `QUESTIONS` call them."""
+"""Columns of numbers with units, and their names in `QUESTIONS`."""
 _WORDS = ("tag", "air_to", "sensor")
 _READ = {question.name: question.read for question in QUESTIONS}
 _HEADER = re.compile(r"\s*([\w ]+?)\s*(?:[\[(](.+)[\])])?\s*")
 _MOST_FAULTS = 6
 _MOST_SIGNALS = 3
-"""Files of single signals that are one record of a valve: pressure, position, set point."""
+"""Most single-signal files in one record of a valve: pressure, position, set point."""
 
 
 _KNOWN = [*_WORDS, *_NUMBERS, *(each.name for each in fields(Columns))]
 
 
 def _row(cells: Mapping[str, tuple[str, str]]) -> str:
-    """Return the valve file of a row, of whose cells each has the unit of its column."""
+    """Return the valve file of a row; each cell comes with the unit of its column."""
     values: dict[str, Any] = {}
     columns: dict[str, Any] = {}
     for name, (cell, unit) in cells.items():
@@ -71,7 +71,7 @@ def _row(cells: Mapping[str, tuple[str, str]]) -> str:
 
 
 def _table(path: Path) -> tuple[list[tuple[str, str]], list[list[str]]]:
-    """Return the columns of a table with their units, and its rows; refuse misspelled columns."""
+    """Return columns with units, and rows of a table; refuse misspelled columns."""
     try:
         content = path.read_bytes()
         text = content.decode(encoding_of(content))
@@ -94,20 +94,20 @@ def _table(path: Path) -> tuple[list[tuple[str, str]], list[list[str]]]:
 def read_plant(path: Path) -> dict[str, ValveFile]:
     """Read the valves of a plant from a CSV file: tag, area, travel, spring, range.
 
-    A number has its unit in its cell or in its header, as ``travel [mm]``. Further columns are
-    ``air_to``, ``sensor`` (gauge or absolute), ``opposing_area``, ``mass``, and what a valve file
-    says in its section ``columns:``, as ``pressure_unit``. Others, as of a list of valves, are
-    passed over.
+    A number has its unit in its cell or in its header, as in ``travel [mm]``. Further columns are
+    ``air_to``, ``sensor`` (gauge or absolute), ``opposing_area``, ``mass``, and the keys of the
+    section ``columns:`` of a valve file, such as ``pressure_unit``. Other columns of a valve list
+    are ignored.
 
     Returns
     -------
     dict of str to ValveFile
-        The valves by their tags.
+        The valves by tag.
 
     Raises
     ------
     ValueError
-        If it cannot be read: the file, and all rows at fault.
+        If the table cannot be read; the message names the file and all faulty rows.
     """
     heads, rows = _table(path)
     valves: dict[str, ValveFile] = {}
@@ -143,9 +143,9 @@ def _pattern(tag: str) -> re.Pattern[str]:
 
 
 def tags_in(texts: Iterable[str], tags: Iterable[str]) -> list[str]:
-    """Return the tags that texts name, whatever stands between their letters and digits.
+    """Return the tags found in texts, with any separators between letters and digits.
 
-    A tag that is the beginning of another one that is there, as FV-10 of FV-10A, is not meant.
+    A tag that is only the beginning of another tag in the text, as FV-10 in FV-10A, is not found.
     """
     whole = "\n".join(texts)
     found: list[str] = []
@@ -158,7 +158,7 @@ def tags_in(texts: Iterable[str], tags: Iterable[str]) -> list[str]:
 
 
 def _tags_named(texts: Iterable[str], plant: Mapping[str, ValveFile]) -> list[str]:
-    """Return the valves that texts name, by their tags or by those of their signals."""
+    """Return the tags of the valves named in texts, by their own tags or those of their signals."""
     texts = list(texts)
     if found := tags_in(texts, plant):
         return found
@@ -172,20 +172,20 @@ def _tags_named(texts: Iterable[str], plant: Mapping[str, ValveFile]) -> list[st
 
 
 def _tag_of(name: str, plant: Mapping[str, ValveFile]) -> str:
-    """Return the valve that the path of a recording names; nothing if it names none or several."""
+    """Return the tag named in the path of a recording; empty if it names none or several."""
     named = (_tags_named([text], plant) for text in reversed(Path(name).parts))
     return next((found[0] for found in named if len(found) == 1), "")
 
 
 def _is_part(found: FoundRecording, valve: ValveFile) -> bool:
-    """Return whether a table holds a single signal, of which nobody can identify a valve."""
+    """Return whether a table holds only one signal, too few to identify a valve."""
     try:
         with on_disk(found.path) as path:
             if is_bag(path) or OpenTable(path, valve.columns).layout.valves:
                 return False
             layout = OpenTable(path, valve.columns, is_part=True).layout
     except (ValueError, OSError):
-        return False  # whoever reads it says why that fails
+        return False  # reading it later gives the cause
     signals = {one.name for group in layout.valves.values() for one in group}
     return len(signals | {*layout.unclear}) == 1
 
@@ -193,10 +193,10 @@ def _is_part(found: FoundRecording, valve: ValveFile) -> bool:
 def with_parts_joined(
     recordings: Sequence[FoundRecording], plant: Mapping[str, ValveFile]
 ) -> Iterator[FoundRecording]:
-    """Yield the recordings; files of single signals of a valve, in one folder, are one recording.
+    """Yield the recordings, with the single-signal files of a valve in a folder joined to one.
 
-    If a folder holds several records of a valve, those belong together whose names differ only in
-    the words for the signals, as ``FV101.PT 2026Q1.csv`` and ``FV101.ZT 2026Q1.csv``.
+    If a folder holds several records of a valve, files belong together if their names differ only
+    in the words for the signals, as in ``FV101.PT 2026Q1.csv`` and ``FV101.ZT 2026Q1.csv``.
     """
     alike: dict[tuple[Path, str], list[FoundRecording]] = {}
     for found in recordings:
@@ -220,12 +220,12 @@ def with_parts_joined(
 def valves_of(
     path: Path, name: str, plant: Mapping[str, ValveFile], is_table: bool
 ) -> Sequence[tuple[str, str, ValveFile]]:
-    """Find the valves of a recording: by its name, else by what stands in it.
+    """Find the valves of a recording by its name, else by its content.
 
-    Returns the label of each in the file (empty for an only one), its tag, and the valve.
+    Returns for each valve its label in the file (empty for a single valve), its tag, and the valve.
 
-    Raises ValueError if none of the tags is named, or several are and the file does not tell which
-    signal is whose.
+    Raises ValueError if no tag is found, or if several are found and the file does not assign the
+    signals to them.
     """
     if tag := _tag_of(name, plant):
         return [("", tag, plant[tag])]

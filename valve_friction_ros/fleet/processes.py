@@ -9,11 +9,12 @@
 
 """Tasks for several processes, each of which may die.
 
-No library's pool does that. `concurrent.futures` gives up all tasks when one process dies. Pebble
-(5.2.3), which names the task that killed its process, shares one pipe and one lock among all of
-them: with 400 tasks, one process and each fifth task a kill, it gave up two of three runs (79 and
-287 tasks lost) and left a task without an answer in the third; a process that ends with exit code 0
-is waited for without end. Here each process has its own pipe, and all 400 are answered.
+No library pool does this. `concurrent.futures` gives up all tasks when one process dies. Pebble
+(5.2.3) names the task that killed its process, but shares one pipe and one lock among all
+processes. With 400 tasks, one process and a kill in every fifth task, it gave up two of three runs
+(79 and 287 tasks lost) and left a task without an answer in the third. It also waits forever for a
+process that ends with exit code 0. Here each process has its own pipe, and all 400 tasks are
+answered.
 """
 
 import contextlib
@@ -32,7 +33,7 @@ _Task = TypeVar("_Task")
 _Answer = TypeVar("_Answer")
 
 _LOOK_UP = 0.1
-"""How often the wish to stop is looked at while the workers are busy, s."""
+"""Interval at which a request to stop is checked while the workers are busy, s."""
 
 _ONE_THREAD = dict.fromkeys(
     ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"
@@ -41,7 +42,7 @@ _ONE_THREAD = dict.fromkeys(
 
 @dataclass(frozen=True)
 class DeadWorker:
-    """In place of an answer: how the process ended that was to give it."""
+    """Replaces an answer if the process ended before giving it; holds the cause."""
 
     cause: str
 
@@ -77,9 +78,9 @@ def _work(tasks: "Connection[_Answer, _Task]", work: Callable[[_Task], _Answer])
 
 @contextlib.contextmanager
 def _surroundings(folder: str) -> Iterator[None]:
-    """Surroundings that a worker inherits: one thread a library, a folder for drafts, no Ctrl-C.
+    """Set what a worker inherits: one thread per library, a temporary folder, Ctrl-C blocked.
 
-    Ctrl-C in a terminal goes to all its processes; only the parent decides what follows.
+    Ctrl-C in a terminal goes to all its processes, but only the parent decides what follows.
     """
     variables = {**_ONE_THREAD, "TMPDIR": folder}
     before = {name: os.environ.get(name) for name in variables}
@@ -105,7 +106,7 @@ class _Worker(Generic[_Task, _Answer]):
         self.process: SpawnProcess = context.Process(
             target=_work, args=(far_end, work), daemon=True
         )
-        # It would undo the mask of signals if it were started under it, by the first process.
+        # Started by the first process, under the mask of signals, it would undo the mask.
         resource_tracker.ensure_running()
         with _surroundings(folder):
             self.process.start()
@@ -114,7 +115,7 @@ class _Worker(Generic[_Task, _Answer]):
 
     def begin(self, task: _Task) -> None:
         self.task = task
-        with contextlib.suppress(OSError):  # a dead worker is met when its answer is asked for
+        with contextlib.suppress(OSError):  # a dead worker is detected when its answer is read
             self.pipe.send(task)
 
     def answer(self) -> _Answer | DeadWorker:
@@ -140,17 +141,17 @@ def in_processes(
 ) -> Iterator[tuple[_Task, _Answer | DeadWorker]]:
     """Yield tasks with their answers, or a `DeadWorker`, as they finish in several processes.
 
-    Each process has one task at a time, so that of one that dies it is known what it died of; a
-    new one takes its place. Compiled libraries get one thread per process. `work` is a function of
-    a module, since the processes are started anew. Once `stopped` returns True nothing more is
-    handed out, and what is being done is given up.
+    Each process has one task at a time, so the task that killed a process is known; a new process
+    replaces it. Compiled libraries get one thread per process. `work` must be a function of a
+    module, since the processes are spawned. Once `stopped` returns True, no more tasks are handed
+    out and tasks in progress are given up.
     """
     waiting = iter(tasks)
-    drafts = TemporaryDirectory()  # what a killed worker leaves behind goes with it
+    drafts = TemporaryDirectory()  # also removes what a killed worker leaves behind
     busy: dict[Connection, _Worker[_Task, _Answer]] = {}
 
     def hand_out(worker: _Worker[_Task, _Answer] | None) -> None:
-        """Give the next task to a worker, or to a new one where there is none."""
+        """Give the next task to a worker, or to a new worker if None."""
         for task in waiting:
             worker = worker or _Worker(work, drafts.name)
             busy[worker.pipe] = worker
@@ -167,7 +168,7 @@ def in_processes(
                 worker = busy[pipe]  # type: ignore[index]
                 task, answer = worker.task, worker.answer()
                 if stopped() and isinstance(answer, DeadWorker):
-                    return  # whoever stopped this may have killed its processes too
+                    return  # the stop may have killed the processes too
                 del busy[worker.pipe]
                 if isinstance(answer, DeadWorker):
                     worker.end()

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The recordings below a folder, and the baselines of their valves."""
+"""Recordings in a folder tree, and the baselines of their valves."""
 
 import csv
 import hashlib
@@ -38,22 +38,22 @@ _VALVE_ENDING = "valve.yaml"
 _STORAGE = (".mcap", ".db3")
 _TABLES = (".csv", ".tsv", ".xlsx", ".xlsm", ".parquet", ".txt", ".lvm", ".dat", ".mat")
 _PERHAPS = (".txt", ".dat")
-"""Endings of tables and of much else: it is a table if some of its first lines hold two numbers."""
+"""Ambiguous endings: such a file is a table if some of its first lines hold two numbers."""
 _TWO_NUMBERS = re.compile(rb"^[^\n]*\d[\t;,| ][^\n]*\d", re.MULTILINE)
 _LOOKED_AT, _FEWEST_ROWS = 16_384, 3
-"""Bytes of such a file that are looked at, and rows that make a table of it."""
+"""Bytes of such a file that are examined, and least rows of a table."""
 _ENDINGS = (*_TABLES, ".bag", *_STORAGE)
-"""Endings of recordings; a bag of ROS 1 is one, so that its refusal says how to convert it."""
+"""Endings of recordings. ROS 1 bags are included, so that the refusal says how to convert them."""
 _HIDDEN = (".", "~$")
-"""Beginnings of names not meant for people; ``~$a.xlsx`` is there while Excel has a.xlsx open."""
+"""Prefixes of hidden files; ``~$a.xlsx`` exists while Excel has a.xlsx open."""
 
 
 @dataclass(frozen=True)
 class FoundRecording:
     """A recording, not yet read: a file or the folder of a bag.
 
-    Its name is its path from the searched folder, with slashes. Where each signal of a valve has
-    its own file, `beside` are the further ones.
+    Its name is its path from the searched folder, with slashes. If each signal of a valve has its
+    own file, `beside` holds the other files.
     """
 
     path: Path
@@ -66,9 +66,9 @@ class FoundRecording:
         return self.path.name if self.path.is_dir() else table_stem(self.path)
 
     def content(self) -> str:
-        """Return a fingerprint of size and time of change of its file or files.
+        """Return a fingerprint of size and modification time of its files.
 
-        Raises OSError if they cannot be looked at.
+        Raises OSError if a file cannot be accessed.
         """
         folder = self.path.is_dir()
         files = sorted(self.path.iterdir()) if folder else [self.path, *self.beside]
@@ -82,7 +82,7 @@ class FoundRecording:
 
 @dataclass(frozen=True)
 class Findings:
-    """The recordings of a folder, and the names of what is none, each in the order of names."""
+    """The recordings in a folder and the names of other files, both sorted by name."""
 
     recordings: tuple[FoundRecording, ...]
     skipped: tuple[str, ...]
@@ -98,14 +98,14 @@ def _ending(name: str) -> str:
 
 
 def _may_be_table(path: Path) -> bool:
-    """Return whether a file of an ending that means little begins like a table."""
+    """Return whether a file may be a table; a file with an ambiguous ending is examined."""
     if Path(path.name).suffix.lower() not in _PERHAPS:
         return True
     try:
         with path.open("rb") as stream:
             start = stream.read(_LOOKED_AT).replace(b"\0", b"")
     except OSError:
-        return True  # whoever reads it says why that fails
+        return True  # reading it later gives the cause
     return len(_TWO_NUMBERS.findall(start)) >= _FEWEST_ROWS
 
 
@@ -131,14 +131,14 @@ def _can_be_written(name: str) -> bool:
 
 
 def find_recordings(folder: Path, *left_out: Path) -> Findings:
-    """Find the recordings in a folder and in those below it, on this machine or in a store.
+    """Find the recordings in a folder and its subfolders, on this machine or in a store.
 
-    A folder with a ``metadata.yaml`` of rosbag2 is one recording, whatever it holds. Elsewhere
-    each table, gzipped or not, and each storage file of a bag is one, found by its ending. Hidden
-    files and folders and links to folders are skipped; so is a name that cannot be written on a
-    line. Files and folders of `left_out`, such as the output, are neither recordings nor skipped.
+    A folder with a ``metadata.yaml`` of rosbag2 is one recording, whatever else it holds. In other
+    folders, each table, gzipped or not, and each storage file of a bag is a recording, found by its
+    ending. Hidden files and folders, links to folders, and names that cannot be written on one line
+    are skipped. Files and folders in `left_out`, such as the output, are neither found nor skipped.
 
-    Raises ValueError if the folder is none, or cannot be read.
+    Raises ValueError if the folder does not exist or cannot be read.
     """
     with explained(folder):
         return _findings(folder, {path.resolve() for path in left_out})
@@ -180,7 +180,7 @@ _COULOMB, _SLIDING, _SPEED = "coulomb_friction", "sliding_friction", "sliding_sp
 class Baselines:
     """Baselines by recording and by the name of the valve in it.
 
-    One without a recording is of its valve in every recording.
+    A baseline without a recording applies to its valve in every recording.
     """
 
     by_recording: Mapping[str, Mapping[str, Baseline]]
@@ -191,12 +191,12 @@ class Baselines:
         return {**everywhere, **self.by_recording.get(recording, {})}
 
     def count(self, recordings: Iterable[str]) -> int:
-        """Count the recordings that have one."""
+        """Count the recordings that have a baseline."""
         return sum(bool(self.of(recording)) for recording in recordings)
 
 
 def _number(row: Mapping[str, str | None], column: str) -> float:
-    """Return a number of a row; nan where the cell is empty or missing."""
+    """Return a number of a row; nan if the cell is empty or missing."""
     text = (row.get(column) or "").strip()
     try:
         return float(text) if text else math.nan
@@ -205,7 +205,7 @@ def _number(row: Mapping[str, str | None], column: str) -> float:
 
 
 def _friction(row: Mapping[str, str | None], name: str) -> Measured | None:
-    """Return a friction; None where it is not above zero, or has no interval."""
+    """Return a friction; None if it is not above zero or has no interval."""
     value, width = _number(row, f"{name}_n"), _number(row, f"{name}_half_width_n")
     if math.isnan(width):  # exact, unless it was identified by a method without intervals
         width = math.inf if row.get(f"{name}_verdict") == Verdict.WEAK.value else 0.0
@@ -213,7 +213,7 @@ def _friction(row: Mapping[str, str | None], name: str) -> Measured | None:
 
 
 def _numbers(row: Mapping[str, str | None]) -> dict[str, Measured]:
-    """Return what else a row says of its valve, where it has intervals."""
+    """Return the other numbers of the valve that have intervals."""
     known = {}
     for name in COMPARED:
         suffix = column_suffix(name)
@@ -226,7 +226,7 @@ def _numbers(row: Mapping[str, str | None]) -> dict[str, Measured]:
 
 
 def _baseline(row: Mapping[str, str | None]) -> Baseline | None:
-    """Return the baseline of a row; None where no friction is known well enough."""
+    """Return the baseline of a row; None if no friction is known well enough."""
     numbers = _numbers(row)
     coulomb, slid, speed = _friction(row, _COULOMB), _friction(row, _SLIDING), _number(row, _SPEED)
     sliding = None
@@ -238,12 +238,11 @@ def _baseline(row: Mapping[str, str | None]) -> Baseline | None:
 def read_baselines(path: Path) -> Baselines:
     """Read the friction of healthy valves from a CSV file, as `identify-folder` writes it.
 
-    Of its columns these count: ``recording``, ``valve``, and the frictions with their half widths;
-    an empty half width stands for an exact value. The other
-    parameters count where they have half widths. A friction that is not known well enough to be a
-    baseline is left out, and so is a refused valve.
+    The columns ``recording``, ``valve``, and the frictions with their half widths are used; an
+    empty half width means an exact value. Other parameters are used if they have half widths. A
+    friction that is not known well enough for a baseline is left out, and so is a refused valve.
 
-    Raises ValueError, one line with the file and the row, if it cannot be read.
+    Raises ValueError, one line with file and row, if the file cannot be read.
     """
     found: dict[str, dict[str, Baseline]] = {}
     try:

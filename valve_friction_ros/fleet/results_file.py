@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The results of many identifications: kept in SQLite, counted, written as CSV, JSON, a page."""
+"""Results of many identifications: stored in SQLite, counted, written as CSV, JSON or HTML."""
 
 import contextlib
 import json
@@ -36,9 +36,9 @@ _KEPT = (*COLUMNS, PICTURE)
 
 @dataclass(frozen=True, eq=False)
 class RecordingRows:
-    """All rows of one recording, one for each valve.
+    """All rows of one recording, one per valve.
 
-    `content` and `settings` are fingerprints of its files and of the options of its identification.
+    `content` and `settings` are fingerprints of its files and of its identification options.
     """
 
     recording: str
@@ -48,34 +48,34 @@ class RecordingRows:
 
     @property
     def failed(self) -> bool:
-        """True if a valve of it was refused."""
+        """True if any valve was refused."""
         return any(row["error"] for row in self.rows)
 
     @property
     def refused(self) -> bool:
-        """True if all valves of it were refused."""
+        """True if all valves were refused."""
         return all(row["error"] for row in self.rows)
 
 
 def database_of(output: Path) -> Path:
-    """Return the file in which the rows of an output are kept, beside it: ``NAME.sqlite``."""
+    """Return the database with the rows of an output, in the same folder: ``NAME.sqlite``."""
     return output.resolve().with_suffix(".sqlite")
 
 
 def reports_of(output: Path) -> Path:
-    """Return the folder of the reports of an output, beside it: ``NAME_reports``."""
+    """Return the folder for the reports of an output, in the same folder: ``NAME_reports``."""
     return output.resolve().with_name(f"{output.resolve().stem}_reports")
 
 
 class ResultsFile(contextlib.AbstractContextManager["ResultsFile"]):
-    """Rows that are on the disk when `append` returns; leaving the context writes the outputs.
+    """Rows that are on disk when `append` returns; leaving the context writes the outputs.
 
-    They are kept in the table ``result`` of `database_of` the first output, in its columns and in
-    the order in which they were appended. Only one process at a time can open it. The ending of an
-    output's name is its format; `zone` is that of the times on its page.
+    The rows are in the table ``result`` of the database of the first output (`database_of`), in the
+    order in which they were appended. Only one process at a time can open it. The ending of an
+    output gives its format; `zone` is the time zone of its page.
 
-    Raises ValueError if an output or the database is another program's, or the database cannot be
-    opened.
+    Raises ValueError if an output or the database belongs to another program, or the database
+    cannot be opened.
     """
 
     def __init__(self, path: Path, *others: Path, zone: str = "") -> None:
@@ -100,7 +100,7 @@ class ResultsFile(contextlib.AbstractContextManager["ResultsFile"]):
     def _open(self) -> None:
         """Lock the database for this process, and check that it holds results of this version."""
         self._connection.execute("PRAGMA locking_mode = EXCLUSIVE")
-        self._connection.execute("PRAGMA journal_mode = WAL")  # one flush of the disk a recording
+        self._connection.execute("PRAGMA journal_mode = WAL")  # one disk flush per recording
         self._connection.execute("PRAGMA synchronous = FULL")
         self._connection.execute("BEGIN EXCLUSIVE")
         self._connection.execute(
@@ -112,7 +112,7 @@ class ResultsFile(contextlib.AbstractContextManager["ResultsFile"]):
         if set(found) - set(_KEPT):
             raise ValueError(f"{self._database}: results of another version: give another output")
         for name in _KEPT:
-            if name not in found:  # of a column that an earlier version did not have
+            if name not in found:  # a column that an earlier version did not have
                 self._connection.execute(f"ALTER TABLE result ADD COLUMN {name}")
         self._connection.commit()
 
@@ -140,20 +140,20 @@ class ResultsFile(contextlib.AbstractContextManager["ResultsFile"]):
                 yield dict(zip(_KEPT, cells, strict=True))
 
     def entries(self) -> Iterator[RecordingRows]:
-        """Go through the recordings."""
+        """Yield the rows of each recording."""
         for recording, group in groupby(self._rows(), lambda row: str(row["recording"])):
             rows = tuple(group)
             yield RecordingRows(recording, str(rows[0]["content"]), str(rows[0]["settings"]), rows)
 
     def keep(self, wanted: Callable[[RecordingRows], bool]) -> int:
-        """Drop the entries that are not wanted, all at once; return their number."""
+        """Drop the entries that are not wanted, in one transaction; return their number."""
         dropped = [(entry.recording,) for entry in self.entries() if not wanted(entry)]
         with self._explained(), self._connection:
             self._connection.executemany("DELETE FROM result WHERE recording = ?", dropped)
         return len(dropped)
 
     def append(self, rows: Sequence[_Row]) -> None:
-        """Add the rows of a recording, all at once; they are on the disk on return."""
+        """Add the rows of a recording in one transaction; they are on disk on return."""
         marks = ", ".join("?" * len(_KEPT))
         cells = [[row.get(column) for column in _KEPT] for row in rows]
         with self._explained(), self._connection:
@@ -172,19 +172,19 @@ _QUOTED = re.compile(r"'[^']*'")
 
 
 def reason_of(error: str) -> str:
-    """Return the reason of a refusal without the numbers and names that are its own."""
+    """Return the reason of a refusal with its own numbers and names masked."""
     return _NUMBER.sub("…", _QUOTED.sub("'…'", error))
 
 
 class Tally(NamedTuple):
-    """Counts of valves, and why some were refused.
+    """Counts of valves, with the reasons of refusals.
 
     Attributes
     ----------
     outcomes : Counter of str
-        Valves by the verdict on their Coulomb friction, or `REFUSED`.
+        Number of valves by the verdict on their Coulomb friction, or `REFUSED`.
     reasons : mapping of str to sequence of str
-        The recording of each refused valve by `reason_of` its error, the most frequent first.
+        Recordings of the refused valves by reason (`reason_of`), the most frequent reason first.
     """
 
     outcomes: Counter[str]
@@ -216,15 +216,15 @@ _WRITERS: Mapping[str, Callable[[Iterable[_Row], Path, str], str]] = {
 
 
 def is_page(output: Path) -> bool:
-    """Return whether an output is the page for people."""
+    """Return whether an output is the HTML page."""
     return output.suffix.lower() == ".html"
 
 
 def writer_of(output: Path) -> Callable[[Iterable[_Row], Path, str], str]:
-    """Return what writes rows in the format that the name of the output ends in.
+    """Return the function that writes rows in the format given by the ending of the output.
 
-    It takes the rows, the output, and the zone of times that people read, and returns the text.
-    Raises ValueError if the ending is not known; the message lists the known ones.
+    It takes the rows, the output and the time zone of the page, and returns the text. Raises
+    ValueError if the ending is unknown; the message lists the known endings.
     """
     known = _WRITERS.get(output.suffix.lower())
     if known is None:
@@ -233,7 +233,7 @@ def writer_of(output: Path) -> Callable[[Iterable[_Row], Path, str], str]:
 
 
 class _Number(NamedTuple):
-    """A cell: its text, and what it is sorted by; an empty one comes last."""
+    """A cell: its text and its sort key; an empty cell is sorted last."""
 
     text: str = ""
     detail: str = ""
@@ -264,7 +264,7 @@ def _dead_band(row: _Row) -> _Number:
 
 
 def _line(row: _Row, zone: str) -> dict[str, Any]:
-    """Return what the page shows of a valve, with times in a zone."""
+    """Return the line of a valve on the page, with times in `zone`."""
 
     def text(name: str) -> str:
         return str(row.get(name) or "")
@@ -287,10 +287,10 @@ def _line(row: _Row, zone: str) -> dict[str, Any]:
 
 
 def page_text(rows: Iterable[_Row], name: str, zone: str = "") -> str:
-    """Return the page of the rows as one HTML file, which needs no network.
+    """Return the page of the rows as one HTML file that needs no network.
 
-    A valve is called by its tag where it is known; times are those of `zone`, or UTC. Its
-    table is sorted by `ranked`, and by any of its columns at a click.
+    A valve appears under its tag if known. Times are in `zone`, or UTC. The table is sorted by
+    `ranked`, and by any column at a click.
     """
     lines = [_line(row, zone) for row in ranked(rows)]
     return (

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""One row for each valve of a recording: its cells, its place in the ranking, its report."""
+"""One row per valve of a recording: its cells, its rank and its report."""
 
 import hashlib
 import math
@@ -66,10 +66,10 @@ COLUMNS: tuple[str, ...] = (
     "warnings",
     "error",
 )
-"""All columns: what a row is about, what came of it, and last why nothing did."""
+"""All columns: first the subject of the row, then its results, last the reason of a refusal."""
 
 PICTURE = "picture"
-"""What a row holds beside its columns: the points of its picture."""
+"""Extra cell of a row: the points of its picture."""
 
 DATED = 946_684_800.0
 """Time, s since 1970, from which a stamp is a date: the year 2000."""
@@ -87,7 +87,7 @@ def _began(recording: Recording) -> str | None:
 
 
 def diagnosis_cells(diagnosis: Diagnosis, findings: Sequence[Finding] = ()) -> dict[str, Cell]:
-    """Fill the cells of a diagnosis and of the findings beside the friction."""
+    """Return the cells of a diagnosis and of the findings beyond friction."""
     told = diagnosis.to_dict()
     low, high = told["ratio_interval"] or (None, None)
     return {
@@ -109,11 +109,10 @@ def result_cells(
     notes: Sequence[str],
     findings: Sequence[Finding] = (),
 ) -> dict[str, Cell]:
-    """Fill the cells of an identified valve; the notes of the reading join the warnings.
+    """Return the cells of an identified valve; the notes on reading join the warnings.
 
-    `findings` are those beside the friction.
-
-    A parameter that the result does not hold leaves its cells empty.
+    `findings` are those beyond friction. A parameter that is not in the result leaves its cells
+    empty.
     """
     shown, recording = result.to_dict(), result.recording
     cells: dict[str, Cell] = {
@@ -137,7 +136,7 @@ def result_cells(
 
 
 def error_cells(valve: str, reason: str, path: Path) -> Mapping[str, Cell]:
-    """Fill the cells of a refused valve; `path`, which the row names, is removed from `reason`."""
+    """Return the cells of a refused valve; `reason` loses `path`, which the row already names."""
     for start in (f"{path}, {valve}: ", f"{path}: "):
         while reason.startswith(start):
             reason = reason.removeprefix(start)
@@ -145,7 +144,7 @@ def error_cells(valve: str, reason: str, path: Path) -> Mapping[str, Cell]:
 
 
 class RowStatus(NamedTuple):
-    """The diagnosis of a row in one word, and the colour class that goes with it."""
+    """The diagnosis of a row in a word or two, with its colour class."""
 
     word: str
     colour: str
@@ -158,7 +157,7 @@ _SURVEYS = {
     "watch": RowStatus("watch", _MAYBE),
     "good": RowStatus("good", "ok"),
 }
-"""The first survey of a valve without a baseline, the worst first."""
+"""Results of the first survey of a valve without a baseline, worst first."""
 _BY_SIGNAL = {
     StatusSignal.FAILURE.value: "excessive",
     StatusSignal.OUT_OF_SPECIFICATION.value: "collapsed",
@@ -183,7 +182,7 @@ def _number(row: Mapping[str, Cell], name: str) -> float:
 
 
 def status_of(row: Mapping[str, Cell]) -> RowStatus:
-    """Say how a valve is: a word, and ``error``, ``warn``, ``maybe``, ``ok`` or ``none``."""
+    """Return the status of a valve, coloured ``error``, ``warn``, ``maybe``, ``ok`` or ``none``."""
     level, ratio = _level(row), _number(row, "ratio")
     if level is None or row.get("error"):
         known = "" if level is None else level.name.lower()
@@ -212,7 +211,7 @@ def _status_of_ratio(ratio: float) -> RowStatus:
 
 
 def _need(row: Mapping[str, Cell]) -> tuple[float, float, float, float, str, str]:
-    """Return what sorts first the valve that needs attention most."""
+    """Return the sort key that puts the valve most in need of attention first."""
     level, ratio = _level(row), _number(row, "ratio")
     change = abs(math.log(ratio)) if ratio > 0 else -math.inf
     severity = -1.0 if level is None else float(level)
@@ -223,30 +222,29 @@ def _need(row: Mapping[str, Cell]) -> tuple[float, float, float, float, str, str
 
 
 def ranked(rows: Iterable[Mapping[str, Cell]]) -> list[Mapping[str, Cell]]:
-    """Sort rows by diagnosis, then by first survey, by the change of friction, by the dead band.
+    """Sort rows by diagnosis, then by first survey, change of friction and dead band.
 
-    A friction that has halved has changed as much as one that has doubled. Refused valves, of which
-    nothing is known, come last.
+    A halved friction has changed as much as a doubled friction. Refused valves come last.
     """
     return sorted(rows, key=_need)
 
 
 def reaches(row: Mapping[str, Cell], level: Level) -> bool:
-    """Return whether the diagnosis of a row is as severe as `level`, or more."""
+    """Return whether the diagnosis of a row is at least as severe as `level`."""
     found = _level(row)
     return found is not None and found >= level
 
 
 PAGE = "page"
-"""What a row holds beside its columns until its report is written: the text of the page."""
+"""Extra cell of a row until its report is written: the text of the page."""
 
 _STRANGE = re.compile(r"[^A-Za-z0-9.-]+")
 _LONGEST_NAME = 100
-"""Characters of a report's name before its digest."""
+"""Most characters of a report name before its digest."""
 
 
 def report_name(recording: str, valve: str) -> str:
-    """Return the name of a report: readable, and no other valve's."""
+    """Return a readable name for a report that is unique to the valve."""
     name = f"{recording} {valve}".strip()
     digest = hashlib.blake2b(name.encode(), digest_size=4).hexdigest()
     return f"{_STRANGE.sub('_', name).strip('_')[:_LONGEST_NAME]}_{digest}.html"
@@ -255,9 +253,9 @@ def report_name(recording: str, valve: str) -> str:
 def with_reports_written(
     rows: Iterable[Mapping[str, Cell]], beside: Path
 ) -> list[Mapping[str, Cell]]:
-    """Write the pages of rows under their names in the folder `beside`, and return the rows.
+    """Write the pages of rows relative to the folder `beside`, and return the rows.
 
-    A page that cannot be written is a warning of its row, as the numbers are there.
+    A page that cannot be written becomes a warning in its row, which keeps its numbers.
     """
     written: list[Mapping[str, Cell]] = []
     for row in rows:
@@ -278,9 +276,9 @@ WIDTH, HEIGHT = 120, 64
 """Size of the picture, in its own units."""
 
 _POINT_STEP = 1.0
-"""Distance between two points. Chosen: as fine as a screen shows at this size."""
+"""Least distance between two points. Chosen: the resolution of a screen at this size."""
 _MOST_POINTS = 500
-"""Points of a picture. Chosen: some strokes, in 5 kB."""
+"""Most points of a picture. Chosen: some strokes, in 5 kB."""
 
 
 def _scaled(values: NDArray[np.float64], length: int) -> NDArray[np.float64]:
