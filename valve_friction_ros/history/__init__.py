@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The history of a valve: its database, and the trend of its friction; no ROS."""
+"""History of a valve: its database and the trend of its friction; no ROS."""
 
 from typing import TYPE_CHECKING
 

@@ -7,11 +7,11 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The life of the alarms as rows of the history: written step by step, listed and filtered.
+"""Alarm events as rows of the history: written step by step, listed and filtered.
 
-A step is made in one transaction, which begins with the alarms as they are in the file: so two
-processes make no step twice, and a killed one makes it or not. All functions raise HistoryError if
-the history cannot be read or written.
+Each step is one transaction that begins by reading the alarms from the file. Two processes
+therefore never make a step twice, and a killed process makes a step completely or not at all. All
+functions raise HistoryError if the history cannot be read or written.
 """
 
 import csv
@@ -58,21 +58,21 @@ _END_OF_TIME = 2**63 - 1
 
 
 class KeptAlarmEvent(NamedTuple):
-    """An event of an alarm, and the valve that it is of."""
+    """An alarm event and its valve."""
 
     valve: KeptValve
     event: AlarmEvent
 
     @property
     def area(self) -> str:
-        """The area of its valve."""
+        """Area of the valve."""
         return area_of(self.valve.name)
 
 
 def area_of(name: str) -> str:
-    """Return the area of a valve, by the name of its identifier: what its namespace lies in.
+    """Return the area of a valve from its identifier name: the parent of its namespace.
 
-    The area of ``/unit_3/fv_101/identifier`` is ``/unit_3``, that of ``/fv_101/identifier`` ``/``.
+    ``/unit_3/fv_101/identifier`` is in the area ``/unit_3``, ``/fv_101/identifier`` in ``/``.
     """
     return name.rsplit("/", 2)[0] or "/"
 
@@ -118,13 +118,13 @@ def _event(row: RowMapping) -> AlarmEvent:
 
 
 def _newest(*of_valve: Any) -> Any:
-    """Return what selects the number of the last event of each alarm."""
+    """Return a query for the id of the last event of each alarm."""
     newest = sa.func.max(_EVENT.c.id)
     return sa.select(newest).where(*of_valve).group_by(_EVENT.c.valve_id, _EVENT.c.kind)
 
 
 def _alarms(connection: Connection, valves: Iterable[int]) -> dict[tuple[int, AlarmKind], Alarm]:
-    """Return the alarms of some valves, each given by its row."""
+    """Return the alarms of several valves, given by their rows."""
     newest = _newest(_EVENT.c.valve_id.in_(valves))
     rows = connection.execute(sa.select(_EVENT).where(_EVENT.c.id.in_(newest))).mappings()
     found = ((row["valve_id"], _event(row).alarm) for row in rows)
@@ -136,16 +136,16 @@ def _alarms_of(connection: Connection, valve: int) -> dict[AlarmKind, Alarm]:
 
 
 class AlarmSteps(NamedTuple):
-    """What a transaction has made of the alarms of a valve: its events, and the alarms now."""
+    """Result of a transaction on the alarms of a valve: its events and the present alarms."""
 
     events: tuple[AlarmEvent, ...]
     alarms: Mapping[AlarmKind, Alarm]
 
 
 def _unkept(connection: Connection, valves: Collection[int]) -> set[int]:
-    """Return the valves whose alarms no file keeps; nobody else writes them to a server meanwhile.
+    """Return the valves whose alarms no file keeps, locked on a server against other writers.
 
-    What a server has of the others is a copy, and the file would not learn of a step that it lacks.
+    For other valves the server holds only a copy; a step made there would not reach their file.
     """
     if connection.dialect.name != "postgresql":
         return {*valves}
@@ -181,9 +181,9 @@ def follow_alarms(
     time: int,
     days: float = 0.0,
 ) -> AlarmSteps:
-    """Keep what the valve and the clock make of its alarms at a time, ns (`all_followed`).
+    """Store the events of the valve and the clock on its alarms at a time, ns (`all_followed`).
 
-    Events `days` older than that go, none for 0; the last one of each alarm stays.
+    Events more than `days` older are deleted (0: none), except the last event of each alarm.
     """
     return _kept(file, valve, days, lambda alarms: all_followed(alarms, conditions, time))
 
@@ -196,10 +196,10 @@ def request_alarms(
     time: int,
     days: float = 0.0,
 ) -> AlarmSteps:
-    """Keep what a person asks of one alarm of a valve, or of all (`all_requested`).
+    """Store a person's request to one alarm of a valve, or to all (`all_requested`).
 
-    Raises AlarmError if that is not possible now, or on a server that has a copy of what an
-    identifier keeps in its file; nothing is kept then.
+    Raises AlarmError, and stores nothing, if the alarm does not allow the action now, or if the
+    server only holds a copy of alarms that an identifier keeps in its file.
     """
     return _kept(history, valve, days, lambda alarms: all_requested(alarms, kind, request, time))
 
@@ -210,10 +210,10 @@ def request_many(
     request: AlarmRequest,
     time: int,
 ) -> int:
-    """Keep what a person asks of many alarms, in one transaction; return of how many it was kept.
+    """Store a person's request to many alarms in one transaction; return the number of events.
 
-    Those that do not allow it now are left out, and those that `request_alarms` refuses on a
-    server. Identifiers that run see it by `AlarmFeed`.
+    Alarms that do not allow the action now are skipped, and so are alarms that `request_alarms`
+    refuses on a server. Running identifiers see the events through `AlarmFeed`.
     """
     with writing(history.place) as connection:
         numbers = {valve: valve_id(connection, valve) for valve in {one for one, _ in asked}}
@@ -229,7 +229,7 @@ def request_many(
 
 
 class AlarmFeed:
-    """Steps of alarms that come into a file, for all identifiers of a process together.
+    """New alarm events in a file, for all identifiers of a process together.
 
     Parameters
     ----------
@@ -246,7 +246,7 @@ class AlarmFeed:
         self._news: defaultdict[str, dict[AlarmKind, Alarm]] = defaultdict(dict)
 
     def is_due(self, now: float) -> bool:
-        """Return whether a look is due at a time, s of a clock that does not go back; once."""
+        """Return True once when a look is due at `now`, s of a monotonic clock."""
         with self._lock:
             if now - self._looked < _FEED_PERIOD:
                 return False
@@ -254,7 +254,7 @@ class AlarmFeed:
             return True
 
     def look(self) -> None:
-        """Read what is new, in any thread; the first look finds nothing new.
+        """Read new events, in any thread; the first look finds none.
 
         Raises HistoryError if the file cannot be read.
         """
@@ -297,7 +297,7 @@ def alarm_feed(path: Path) -> AlarmFeed:
 
 
 def read_alarms(file: History, valve: str) -> dict[AlarmKind, Alarm]:
-    """Return the alarms of the valve of this name; those that were never raised are not there."""
+    """Return the alarms of the valve of this name, without alarms that were never raised."""
     number = sa.select(tables.valve.c.id).where(tables.valve.c.name == valve)
     with reading(file.place) as connection:
         found = connection.scalar(number)
@@ -309,22 +309,22 @@ def read_alarms(file: History, valve: str) -> dict[AlarmKind, Alarm]:
 
 @dataclass(frozen=True)
 class AlarmFilter:
-    """Which events, or alarms, are listed.
+    """Filter of the listed alarm events.
 
     Attributes
     ----------
     since, until : int
-        Times, ns since 1970 (UTC), from and before which they happened.
+        Interval of time, ns since 1970 (UTC); `until` is excluded.
     area : str
-        Area of their valves, with the areas in it; ``/``: the whole plant.
+        Area of the valves, including its subareas; ``/`` for the whole plant.
     valve : str
-        Name of the identifier; empty: all.
+        Name of the identifier; empty for all.
     states : frozenset of AlarmState
-        States of the alarms from then on; empty: all.
+        States of the alarms after the event; empty for all.
     kinds : frozenset of AlarmKind
-        What they are about; empty: all.
+        Kinds of the alarms; empty for all.
     words : str
-        Each of these words must be in tag, name, sentence, person or text.
+        Words that must all occur in tag, name, message, person or text.
     """
 
     since: int = -_END_OF_TIME
@@ -355,7 +355,7 @@ class AlarmFilter:
 def _listed(
     history: History, chosen: AlarmFilter, most: int, *more: Any
 ) -> tuple[KeptAlarmEvent, ...]:
-    # Names of columns are those of the events; name and tag are the valve's.
+    # Columns are named as in the events; only name and tag come from the valve.
     query = (
         sa.select(_EVENT, tables.valve.c.name.label("valve_name"), tables.valve.c.tag)
         .select_from(joined(_EVENT, tables.valve))
@@ -373,14 +373,14 @@ def _listed(
 def alarm_events(
     history: History, chosen: AlarmFilter | None = None, most: int = 100_000
 ) -> tuple[KeptAlarmEvent, ...]:
-    """Return events of alarms, the newest first, `most` of them at most."""
+    """Return at most `most` alarm events, newest first."""
     return _listed(history, chosen or AlarmFilter(), most)
 
 
 def standing_alarms(
     history: History, chosen: AlarmFilter | None = None, most: int = 100_000
 ) -> tuple[KeptAlarmEvent, ...]:
-    """Return the last event of each alarm that is not normal, the newest first."""
+    """Return the last event of each alarm that is not normal, newest first."""
     is_last = _EVENT.c.id.in_(_newest())
     is_normal = _EVENT.c.state == AlarmState.NORMAL.name
     return _listed(history, chosen or AlarmFilter(), most, is_last, sa.not_(is_normal))
@@ -402,11 +402,11 @@ _CSV: dict[str, Callable[[KeptAlarmEvent], object]] = {
     "text": lambda one: one.event.text,
     "message": lambda one: one.event.alarm.message,
 }
-"""What each column of the CSV says of an event."""
+"""Content of each column of the CSV, from an event."""
 
 
 def alarms_as_csv(events: Iterable[KeptAlarmEvent]) -> str:
-    """Write events as CSV, a line each, times after ISO 8601 (UTC)."""
+    """Return events as CSV, one line per event, with times in ISO 8601 (UTC)."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(_CSV)

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Rows as each history holds them, and the copy of one history to another, which is verified."""
+"""Verified copy of one history to another, with rows in a form common to both."""
 
 import contextlib
 import hashlib
@@ -29,27 +29,27 @@ from valve_friction_ros.history.rows import settings_id, valve_id
 from valve_friction_ros.history.tables import joined, key_of, put, without_nul
 
 _MANY = 500
-"""Rows that are read at once, or written in one transaction. Chosen: some megabytes."""
+"""Rows read together, or written in one transaction. Chosen: some megabytes."""
 
 _OWN = frozenset({"id", "valve_id", "settings_id"})
-"""Columns whose numbers one history alone gives."""
+"""Columns with numbers that are valid within one history only."""
 
 Key = tuple[Any, ...]
-"""Values of the columns of a part's key."""
+"""Values of the key columns of a part."""
 
 
 @dataclass(frozen=True)
 class Part:
-    """A table with rows of valves.
+    """A table with rows per valve.
 
     Attributes
     ----------
     table : Table
         The table.
     is_kept : bool
-        Whether a row stays as it is once it was written, so that it is never sent again.
+        Whether a row never changes once written, so that it is never sent again.
     children : tuple of Table
-        Tables whose rows belong to a row of this one, and came with it.
+        Tables whose rows belong to a row of this table, and are written with it.
     """
 
     table: sa.Table
@@ -58,27 +58,27 @@ class Part:
 
     @property
     def name(self) -> str:
-        """The name of the table."""
+        """Name of the table."""
         return self.table.name
 
     @property
     def key(self) -> tuple[str, ...]:
-        """The columns that tell the rows of one valve apart, in each history alike."""
+        """Columns that distinguish the rows of one valve, the same in each history."""
         return key_of(self.table)[1:]
 
     @property
     def order(self) -> list[sa.Column[Any]]:
-        """The columns by which its rows are in the order in which they were kept, or sorted."""
+        """Columns that sort its rows in the order of storage, or else by key."""
         names = ("id",) if "id" in self.table.c else key_of(self.table)
         return [self.table.c[name] for name in names]
 
     @property
     def owner(self) -> str:
-        """The column by which the children name their row."""
+        """Column by which the children refer to their row."""
         return f"{self.name}_id"
 
     def among(self, keys: Iterable[tuple[int, Key]]) -> Any:
-        """Return what is true of the rows of some keys, each of the valve of a row."""
+        """Return the condition for rows with given keys, each with the row of its valve."""
         columns = [self.table.c[name] for name in key_of(self.table)]
         return sa.tuple_(*columns).in_([(valve, *key) for valve, key in keys])
 
@@ -96,19 +96,19 @@ PARTS = (
     Part(tables.evidence_change),
     Part(tables.answer),
 )
-"""All parts, in the order in which they are copied."""
+"""All parts, in the order of copying."""
 
 
 @dataclass(frozen=True)
 class CopiedRow:
-    """A row of a part, with what belongs to it.
+    """A row of a part, with its children.
 
     Attributes
     ----------
     key : tuple
-        By what it is known among those of its valve.
+        Key of the row among the rows of its valve.
     values : mapping of str to object
-        Its columns, the text of the settings among them.
+        Its columns, including the text of the settings.
     children : mapping of str to sequence of mapping
         Columns of the rows that belong to it, by table.
     """
@@ -119,7 +119,7 @@ class CopiedRow:
 
     @property
     def checksum(self) -> bytes:
-        """Sum of all that it holds, the same in each history."""
+        """Checksum of its whole content, the same in each history."""
         children = {
             table: sorted(repr(_plain(one)) for one in rows)
             for table, rows in self.children.items()
@@ -130,14 +130,14 @@ class CopiedRow:
 
 
 def _plain(values: Mapping[str, Any]) -> list[tuple[str, Any]]:
-    """Return columns in one order, with values as both databases hold them."""
+    """Return columns in a fixed order, with values as both databases hold them."""
     return sorted((name, without_nul(one)) for name, one in values.items())
 
 
 def rows_of(connection: Connection, part: Part, chosen: Any) -> Iterator[tuple[int, CopiedRow]]:
-    """Read the rows of a part of which a condition holds, in the order of their keeping.
+    """Read the rows of a part that meet a condition, in the order of storage.
 
-    With each comes the row of its valve.
+    Each comes with the row of its valve.
     """
     query = sa.select(part.table).where(chosen).order_by(*part.order)
     if "settings_id" in part.table.c:
@@ -155,7 +155,7 @@ def rows_of(connection: Connection, part: Part, chosen: Any) -> Iterator[tuple[i
 def _children(
     connection: Connection, part: Part, rows: Sequence[RowMapping]
 ) -> dict[int, dict[str, list[dict[str, Any]]]]:
-    """Return what belongs to rows, by row and table."""
+    """Return the children of rows, by row and table."""
     found: defaultdict[int, dict[str, list[dict[str, Any]]]] = defaultdict(
         lambda: {table.name: [] for table in part.children}
     )
@@ -170,7 +170,7 @@ def _children(
 def write_rows(connection: Connection, part: Part, rows: Sequence[tuple[int, CopiedRow]]) -> None:
     """Write rows, each with its valve's row in this history; writing them twice changes nothing.
 
-    A row that is kept stays as it is there; any other is replaced.
+    An existing row is replaced, except in a part that is kept.
     """
     if not rows:
         return
@@ -206,15 +206,15 @@ class CopiedPart(NamedTuple):
     Attributes
     ----------
     table : str
-        The table; what belongs to its rows counts with them.
+        The table; children are included in its rows.
     rows : int
-        Rows of the copied valves in the first history.
+        Number of rows of the copied valves in the source.
     written : int
-        Those that the second one lacked, or had otherwise.
+        Number of rows that were missing or different in the target.
     same : int
-        Those that are in the second one now with the same checksum.
+        Number of rows that now have the same checksum in the target.
     checksum : str
-        Sum over all rows in the first one, and in `copied` over the same rows of the second one.
+        Checksum over all rows of the source; `copied` is that over the same rows of the target.
     """
 
     table: str
@@ -226,15 +226,15 @@ class CopiedPart(NamedTuple):
 
     @property
     def is_same(self) -> bool:
-        """Whether each row of the first one is in the second one as it is there."""
+        """Whether the target holds each row of the source unchanged."""
         return self.rows == self.same and self.checksum == self.copied
 
 
 @contextlib.contextmanager
 def _source(place: Place) -> Iterator[Place]:
-    """Give a history of this version: a file of an older one is copied aside, and stays as it is.
+    """Yield a history of this version; a file of an older version is converted in a copy.
 
-    The keys that its rows get are the same each time.
+    The rows get the same keys each time.
     """
     if isinstance(place, HistoryServer) or is_current(place):
         yield place
@@ -253,29 +253,29 @@ def copied(
     valves: Sequence[str] | None = None,
     tell: Callable[[int], object] = lambda _: None,
 ) -> tuple[CopiedPart, ...]:
-    """Copy a history to another one, all valves or some, and compare the two.
+    """Copy all or some valves of a history to another history, and compare the two.
 
-    Only rows that the other one lacks are written, so a copy that has ended early goes on where it
-    was. Rows of other valves, and of the same valves from elsewhere, stay there.
+    Only rows that are missing or different in the target are written, so an interrupted copy can be
+    resumed. Other rows in the target stay, of other valves and of the same valves.
 
     Parameters
     ----------
     source, target : Path or HistoryServer
-        From where, and to where.
+        The two histories.
     valves : sequence of str, optional
         Names of identifiers.
     tell : callable, optional
-        Is given the number of rows written so far.
+        Called with the number of rows written so far.
 
     Returns
     -------
     tuple of CopiedPart
-        A line for each table.
+        One item per table.
 
     Raises
     ------
     HistoryError
-        If one of them cannot be read, or the second one cannot be written.
+        If a history cannot be read, or the target cannot be written.
     """
     if source == target:
         raise HistoryError(f"{target}: is both ends of the copy: name another one")
@@ -296,14 +296,14 @@ def _total(sums: Sequence[bytes]) -> str:
 
 
 class _Job:
-    """The copy of one part after the other."""
+    """Copies one part after another."""
 
     def __init__(self, old: Connection, target: Place, tell: Callable[[int], object]) -> None:
         self._old, self._target, self._tell = old, target, tell
         self._written = 0
 
     def copy(self, part: Part, pairs: Sequence[tuple[int, int]]) -> CopiedPart:
-        """Copy the rows of valves, each given by its rows in the two histories."""
+        """Copy the rows of valves, each given by its row in either history."""
         before, sums = self._sums(part, pairs), dict[tuple[int, Key], bytes]()
         begun, waiting = self._written, list[tuple[int, CopiedRow]]()
         for here, there in pairs:

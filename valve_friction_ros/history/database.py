@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Connections to a history, in SQLite or PostgreSQL, each for one transaction."""
+"""Connections to a history in SQLite or PostgreSQL, each for one transaction."""
 
 import contextlib
 import os
@@ -35,15 +35,15 @@ from valve_friction_ros.history.tables import (
 )
 
 _APPLICATION = 0x56465248
-"""The database's application_id, "VFRH" in ASCII, so that a history is recognised; on a server the
-number of the lock under which one process at a time changes the tables."""
+"""The application_id of the database, "VFRH" in ASCII, by which a history is recognised; on a
+server, the number of the lock under which one process at a time changes the tables."""
 
 _PATIENCE = 3.0
-"""Longest wait, s, for another process that writes. Chosen: one transaction takes milliseconds, and
-who has called a service waits for it too."""
+"""Longest wait, s, for another writing process. Chosen: a transaction takes milliseconds, and the
+caller of a service waits for it too."""
 
 _PATIENCE_WITH_SERVER = 30.0
-"""Longest wait, s, for an answer. Chosen: a statement takes milliseconds."""
+"""Longest wait, s, for a response of a server. Chosen: a statement takes milliseconds."""
 
 _OF_SERVER = {
     "connect_timeout": "5",
@@ -53,7 +53,7 @@ _OF_SERVER = {
     "keepalives_count": "3",
     "tcp_user_timeout": "30000",
 }
-"""What the address may say otherwise: a server or network that is gone is noticed."""
+"""Defaults that the address may override, by which a lost server or network is detected."""
 
 _INSTALL = "pip install 'SQLAlchemy>=2.0,<3' 'psycopg[binary]>=3.2,<4'"
 
@@ -92,12 +92,12 @@ _REMEDIES_OF_SERVER = (
 )
 _NOT_NULL, _CHECK = "23502", "23514"
 _DATA, _PROGRAM_LIMIT = "22", "54"
-"""SQLSTATEs, and classes of them, of errors of a row, not of the server."""
+"""SQLSTATEs, and classes of SQLSTATEs, for errors of a row rather than of the server."""
 
 
 @contextlib.contextmanager
 def _explained(place: Place) -> Iterator[None]:
-    """Raise HistoryError, of one line, in place of an error of the database or the way to it."""
+    """Turn an error of the database or of the connection into a HistoryError of one line."""
     try:
         yield
     except (sa.exc.DBAPIError, OSError) as error:
@@ -121,7 +121,7 @@ def _is_refusal(error: Exception) -> bool:
 
 
 _uri: ContextVar[str] = ContextVar("uri")
-"""The file that is opened next, as SQLite names it."""
+"""URI of the file to be opened next."""
 
 
 def _opened() -> sqlite3.Connection:
@@ -131,7 +131,7 @@ def _opened() -> sqlite3.Connection:
 
 
 _FILES = sa.create_engine("sqlite://", creator=_opened, poolclass=NullPool, future=True)
-"""What opens a file anew for each connection, and remembers the statements of all files."""
+"""Engine that opens a file anew for each connection, and caches statements across files."""
 
 
 def _name(path: Path, mode: str) -> str:
@@ -140,7 +140,7 @@ def _name(path: Path, mode: str) -> str:
 
 @contextlib.contextmanager
 def _file(path: Path, mode: str) -> Iterator[Connection]:
-    """Open a file by a URI's `mode`, and close it at the end."""
+    """Open a file with the `mode` of its URI, and close it at the end."""
     _uri.set(_name(path, mode))
     with _explained(path), _FILES.connect() as connection:
         yield connection
@@ -151,9 +151,9 @@ def _pragma(connection: Connection, name: str) -> int:
 
 
 def _version_of_file(path: Path, connection: Connection) -> int:
-    """Return the version of a file, 0 for an empty one; refuse any other that is no history.
+    """Return the version of a history, 0 for an empty file; refuse any other file.
 
-    It reads in the caller's transaction: another process may just be creating the tables.
+    It reads in the caller's transaction, since another process may just be creating the tables.
     """
     application, version = (_pragma(connection, n) for n in ("application_id", "user_version"))
     if application != _APPLICATION:
@@ -182,8 +182,8 @@ def _writing_file(path: Path) -> Iterator[Connection]:
         connection.exec_driver_sql("BEGIN")
         _version_of_file(path, connection)
         connection.exec_driver_sql("COMMIT")
-        # The write-ahead journal where the file system allows it, else the older, slower one: with
-        # both a finished transaction is on the disk before the next statement.
+        # The write-ahead journal if the file system allows it, else the older, slower journal. With
+        # either, a finished transaction is on disk before the next statement.
         with contextlib.suppress(sa.exc.OperationalError):
             connection.exec_driver_sql("PRAGMA journal_mode = WAL")
         connection.exec_driver_sql("PRAGMA synchronous = FULL")
@@ -199,8 +199,8 @@ def _writing_file(path: Path) -> Iterator[Connection]:
 def _reading_mode(path: Path) -> str:
     """Return the mode in which a file can be read.
 
-    The write-ahead journal needs files beside the database. Where they cannot be created, no
-    process writes; without a remaining journal the database file alone holds all rows.
+    The write-ahead journal needs files beside the database. If they cannot be created, no process
+    writes. Without a remaining journal, the database file alone holds all rows.
     """
     try:
         _uri.set(_name(path, "mode=ro"))
@@ -214,7 +214,7 @@ def _reading_mode(path: Path) -> str:
 
 @contextlib.contextmanager
 def _reading_file(path: Path) -> Iterator[tuple[Connection, int]]:
-    """Open an existing file to read one state of it; give the version of its tables, too."""
+    """Open an existing file to read one state of it; also yield the version of its tables."""
     try:
         is_there = path.is_file()
     except OSError as error:
@@ -238,12 +238,12 @@ def is_current(path: Path) -> bool:
 
 
 def is_ready(path: Path) -> bool:
-    """Return whether a file is a history of this version that can be written, without waiting."""
+    """Return, without waiting, whether a file is a writable history of this version."""
     return is_current(path) and all(os.access(one, os.W_OK) for one in (path, path.parent))
 
 
 def back_up(path: Path, copy: Path) -> None:
-    """Copy a file as it is to another one."""
+    """Copy a file unchanged to another file."""
     with _reading_file(path) as (old, _), contextlib.closing(sqlite3.connect(copy)) as new:
         file: Any = old.connection
         file.backup(new)
@@ -255,9 +255,9 @@ def back_up(path: Path, copy: Path) -> None:
 def _in_time(
     steps: Generator[Any, Any, Any], patience: float, end: Any
 ) -> Generator[Any, Any, Any]:
-    """Go on with what waits for a server, which is told every tenth of a second that it waits.
+    """Run the `steps` of a wait for a server, which resumes every tenth of a second.
 
-    Where the answer is late, `end` is called, and TimeoutError raised: a server may stand still.
+    If the response takes too long, call `end` and raise TimeoutError: a server may hang.
     """
     deadline, ready = time.monotonic() + patience, None
     while True:
@@ -273,7 +273,7 @@ def _in_time(
 
 @lru_cache(maxsize=64)
 def server_engine(server: HistoryServer) -> Engine:
-    """Return what connects to a server; what connections have ended it replaces."""
+    """Return the engine for a server; it replaces connections that have ended."""
     try:
         import psycopg  # noqa: PLC0415 - an extra
         from psycopg.conninfo import conninfo_to_dict  # noqa: PLC0415
@@ -289,7 +289,7 @@ def server_engine(server: HistoryServer) -> Engine:
     chosen: dict[str, Any] = {name: one for name, one in _OF_SERVER.items() if name not in given}
 
     class Patient(psycopg.Connection[Any]):
-        """A connection that ends where an answer does not come in time."""
+        """A connection that ends if a response does not arrive in time."""
 
         def wait(self, gen: Any, *arguments: Any, **options: Any) -> Any:
             steps = _in_time(gen, _PATIENCE_WITH_SERVER, self.pgconn.finish)
@@ -302,7 +302,7 @@ def server_engine(server: HistoryServer) -> Engine:
         connection = Patient.connect(
             server.url,
             autocommit=True,
-            prepare_threshold=None,  # a pooler may stand between
+            prepare_threshold=None,  # a pooler may sit in between
             client_encoding="utf8",
             **chosen,
         )
@@ -325,7 +325,7 @@ def server_engine(server: HistoryServer) -> Engine:
 
 
 def _version_on_server(connection: Connection, server: HistoryServer) -> int:
-    """Return the version of the tables, 0 where there are none; refuse those of a newer one."""
+    """Return the version of the tables, 0 without tables; refuse tables of a newer version."""
     if connection.scalar(sa.select(sa.func.to_regclass(mark.name))) is None:
         return 0
     version = int(connection.scalar(_marked("schema")) or 0)
@@ -342,20 +342,20 @@ def _marked(name: str) -> Any:
 
 
 def marked(connection: Connection, name: str) -> str | None:
-    """Return what a database says of itself under a name."""
+    """Return the mark of a database under a name, or None."""
     found = connection.scalar(_marked(name))
     return None if found is None else str(found)
 
 
 def set_mark(connection: Connection, name: str, value: str, *, is_kept: bool = False) -> None:
-    """Have a database say something of itself."""
+    """Store a mark in a database; with `is_kept`, only if there is none."""
     put(connection, mark, [{"name": name, "value": value}], is_kept=is_kept)
 
 
 @contextlib.contextmanager
 def _writing_server(server: HistoryServer) -> Iterator[Connection]:
     with _explained(server), server_engine(server).begin() as connection:
-        # It has a number from its beginning on, by which a reader knows that it is under way.
+        # Get a transaction number at the start, so that a reader knows that it is in progress.
         connection.execute(sa.select(sa.func.pg_current_xact_id()))
         if _version_on_server(connection, server) < SCHEMA_VERSION:
             connection.execute(sa.select(sa.func.pg_advisory_xact_lock(_APPLICATION)))
@@ -381,19 +381,19 @@ def _reading_server(server: HistoryServer) -> Iterator[tuple[Connection, int]]:
 
 
 def writing(place: Place) -> contextlib.AbstractContextManager[Connection]:
-    """Open a history for one transaction; its tables are made if they are missing, or old.
+    """Open a history for one transaction; create missing tables and update old tables.
 
-    Raises HistoryError if it cannot be written; then no part of the transaction is.
+    Raises HistoryError if the history cannot be written; then no part of the transaction is.
     """
     return _writing_server(place) if isinstance(place, HistoryServer) else _writing_file(place)
 
 
 @contextlib.contextmanager
 def reading(place: Place) -> Iterator[Connection]:
-    """Open an existing history, to read one state of it.
+    """Open an existing history to read one state of it.
 
-    One of an older version looks as one of now. Raises HistoryError if it is missing, or cannot be
-    read, or a row holds what no value of this package may be.
+    A history of an older version appears like one of this version. Raises HistoryError if the
+    history is missing or cannot be read, or if a row holds invalid values.
     """
     opened = _reading_server(place) if isinstance(place, HistoryServer) else _reading_file(place)
     with opened as (connection, version):

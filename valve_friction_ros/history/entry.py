@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Entries of the history: identifications of a valve, and its baselines."""
+"""Entries of the history: identifications and baselines of a valve."""
 
 import json
 import math
@@ -38,15 +38,15 @@ from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.streams.record_buffer import Snapshot
 
 _MOST_SAMPLES = 2000
-"""Samples of a kept record. Chosen: the loop of forty strokes is round, in 16 kB."""
+"""Most samples of a stored record. Chosen: the loop of forty strokes is smooth, in 16 kB."""
 
 _NOTHING: Mapping[str, Measured] = MappingProxyType({})
 _ENDLESS = 1e300
-"""Half width, N, from which an interval says nothing."""
+"""Half width, N, from which an interval carries no information."""
 
 
 class KeptValve(NamedTuple):
-    """A valve: the fully qualified name of its identifier, and its tag in the plant."""
+    """A valve: fully qualified name of its identifier, and tag in the plant."""
 
     name: str
     tag: str
@@ -60,16 +60,16 @@ class Span(NamedTuple):
 
 
 class Fit(NamedTuple):
-    """How well a model reproduces its record; nan where it is unknown.
+    """How well a model reproduces its record; nan if unknown.
 
     Attributes
     ----------
     share : float
-        Share of the stem's motion (of the force, without a spring) that is reproduced.
+        Share of the stem motion that the model reproduces; of the force without a spring.
     rms : float
         Distance between simulated and measured stem, m.
     systematic : float
-        Part of it that is not noise, m.
+        Part of that distance that is not noise, m.
     """
 
     share: float = math.nan
@@ -79,7 +79,7 @@ class Fit(NamedTuple):
 
 @dataclass(frozen=True)
 class AlarmRecording:
-    """The record that was saved when the level of a valve had risen.
+    """The record saved when the level of a valve rose.
 
     Attributes
     ----------
@@ -88,9 +88,9 @@ class AlarmRecording:
     level : Level
         The level from then on.
     path : Path
-        The bag, with the page of the report in its folder; it may have been removed since.
+        The bag, with the report page in its folder; it may have been removed since.
     message : str
-        The diagnosis of that time.
+        The diagnosis at that time.
     """
 
     time: int
@@ -121,15 +121,15 @@ class KeptBaseline:
     since : int
         When its result was identified, ns: a new trend begins there.
     record : Recording or None
-        Its record, thinned (`thin`), for pictures; None where it is unknown.
+        Its record, thinned (`thin`), for pictures; None if unknown.
     replaced : Baseline or None
-        The baseline that was in force before; None: there was none, or it is unknown.
+        The baseline in force before; None without one, or if unknown.
     by : str
         The service that set it.
     level : Level or None
-        Level of the diagnosis when it was set; None where it is unknown.
+        Level of the diagnosis when it was set; None if unknown.
     withdrawn : bool
-        Whether this baseline was withdrawn then, so that none is in force.
+        Whether this change withdrew the baseline, so that none is in force.
     """
 
     baseline: Baseline
@@ -159,7 +159,7 @@ class KeptBaseline:
 
     @staticmethod
     def thin(record: Recording) -> Recording:
-        """Return at most `_MOST_SAMPLES` samples of a record, evenly spread over it."""
+        """Return at most `_MOST_SAMPLES` samples of a record, evenly spaced."""
         step = -(-len(record) // _MOST_SAMPLES)
         return Recording(
             record.sample_period * step,
@@ -192,15 +192,15 @@ class HistoryEntry:
     span : Span or None
         Time of its record; None for an empty buffer.
     method : str
-        Method of the identification, never a choice of one.
+        The method actually used, never an automatic choice.
     diagnosis : Diagnosis
         The diagnosis that the operator saw.
     limits : FrictionLimits
-        The bounds in force.
+        The limits in force.
     baseline : Baseline or None
         The baseline in force.
     settings : str
-        Settings of the identification, an object of JSON (`settings_text`).
+        Settings of the identification, a JSON object (`settings_text`).
     parameters : mapping of str to Parameter
         The identified parameters; empty for a refusal.
     fit : Fit
@@ -212,9 +212,9 @@ class HistoryEntry:
     version : str
         Version of this software.
     sliding_speed : float
-        Speed that the sliding friction belongs to, m/s; nan where it is unknown.
+        Speed to which the sliding friction applies, m/s; nan if unknown.
     numbers : mapping of str to Measured
-        What else was measured of the valve (`valve_numbers`).
+        Other measured numbers of the valve (`valve_numbers`).
     """
 
     time: int
@@ -234,7 +234,7 @@ class HistoryEntry:
     numbers: Mapping[str, Measured] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Refuse an entry that is not exactly one of success and refusal."""
+        """Refuse an entry that is neither or both of success and refusal."""
         if bool(self.parameters) == bool(self.refusal):
             raise ValueError("an entry holds either parameters or the reason of a refusal")
         object.__setattr__(self, "parameters", MappingProxyType(dict(self.parameters)))
@@ -252,7 +252,7 @@ class HistoryEntry:
     def to_dict(self) -> dict[str, Any]:
         """Return the entry as a mapping of plain values, SI units; times are ns since 1970 (UTC).
 
-        What it keeps of a result has the keys of `Result.to_dict`.
+        Values from a result have the keys of `Result.to_dict`.
         """
         begin, end = self.span or (None, None)
         return {
@@ -282,7 +282,7 @@ class HistoryEntry:
 
 
 def trended(baseline: Baseline | None) -> str:
-    """Return the name of the friction whose trend is followed against a baseline."""
+    """Return the name of the friction whose trend is compared with a baseline."""
     has_sliding = baseline is not None and baseline.sliding is not None
     return SLIDING if has_sliding else "coulomb_friction"
 
@@ -296,10 +296,10 @@ def friction_point(
 ) -> DatedNumber | None:
     """Return the point of an identification in a trend, or None.
 
-    Where the baseline has a sliding friction, it is the sliding friction carried to that speed;
-    else F_c. Its interval leaves the calibration out, which is common to all points and the
-    baseline. Only an identified or weak friction counts: a fixed friction was not measured, and a
-    friction that is not identifiable has no value.
+    If the baseline has a sliding friction, the point is the sliding friction converted to its
+    speed; else F_c. The interval excludes the calibration, which is common to all points and the
+    baseline. Only an identified or weak friction gives a point: a fixed friction was not measured,
+    and a friction that is not identifiable has no value.
     """
     one = parameters.get(trended(baseline))
     if one is not None:
@@ -325,7 +325,7 @@ def span_of(snapshot: Snapshot) -> Span | None:
 
 
 def settings_text(settings: MonitorSettings) -> str:
-    """Write the settings of an identification as JSON; equal settings give equal text."""
+    """Return the settings of an identification as JSON; equal settings give equal text."""
     content = {
         "valve": vars(settings.valve),
         "identification": vars(settings.identification),
@@ -353,7 +353,7 @@ def entry_of(
     snapshot : Snapshot
         The record.
     settings : MonitorSettings
-        Settings of this identification; those in force may differ by now.
+        Settings of this identification; the settings in force may have changed since.
     time : int
         Now, ns.
     refusal : RefusalError, optional

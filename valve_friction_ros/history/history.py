@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The history of a plant's valves: a file that several processes write at once, or a server."""
+"""History of the valves of a plant: a file shared by several processes, or a server."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -50,7 +50,7 @@ _END_OF_TIME = 2**63 - 1
 
 
 def _of_valve(table: sa.Table, valve: str, since: int, until: int = _END_OF_TIME) -> Any:
-    """Return what selects the rows of a valve from `since` on and before `until`, ns."""
+    """Return a query for the rows of a valve from `since` to before `until`, ns."""
     time = table.c.time_ns
     chosen = (tables.valve.c.name == valve, time >= since, time < until)
     return sa.select(table).select_from(joined(table, tables.valve)).where(*chosen)
@@ -58,14 +58,14 @@ def _of_valve(table: sa.Table, valve: str, since: int, until: int = _END_OF_TIME
 
 @dataclass(frozen=True)
 class History:
-    """A history, in a file of SQLite or in PostgreSQL on a server.
+    """A history in an SQLite file, or in PostgreSQL on a server.
 
-    Every method raises HistoryError if it cannot be read.
+    Every method raises HistoryError if the history cannot be read.
 
     Attributes
     ----------
     place : Path or HistoryServer
-        Where it is.
+        Location of the history.
     """
 
     place: Place
@@ -73,7 +73,7 @@ class History:
     def baseline(self, valve: str, until: int = _END_OF_TIME) -> KeptBaseline | None:
         """Return the newest baseline set before `until` (ns) for the valve of this name, if any.
 
-        There is none where the newest one was withdrawn.
+        None if the newest baseline was withdrawn.
         """
         query = _of_valve(tables.baseline, valve, -_END_OF_TIME, until)
         newest = query.order_by(tables.baseline.c.id.desc()).limit(1)
@@ -95,7 +95,7 @@ class History:
             return tuple(map(kept_baseline_in, connection.execute(query).mappings()))
 
     def last_success(self, valve: str) -> HistoryEntry | None:
-        """Return the identification that a valve's diagnosis was last made by, if any."""
+        """Return the last successful identification of a valve, if any."""
         table = tables.identification
         successes = _of_valve(table, valve, -_END_OF_TIME).where(table.c.refusal.is_(None))
         with reading(self.place) as connection:
@@ -111,7 +111,7 @@ class History:
     def known_numbers(self, valve: str, built: Valve, since: int) -> KnownNumbers:
         """Return the newest measurement of each number of a valve since a time, ns.
 
-        Only identifications with the parameters `built` of the valve count.
+        Only identifications with the valve parameters `built` are used.
         """
         with reading(self.place) as connection:
             return known_numbers_in(connection, valve, built, since)
@@ -119,7 +119,7 @@ class History:
     def points(
         self, valve: str, method: str, since: int = 0, baseline: Baseline | None = None
     ) -> tuple[DatedNumber, ...]:
-        """Return a valve's frictions of one method, from `since` on (`friction_point`)."""
+        """Return the frictions of a valve by one method, from `since` on (`friction_point`)."""
         names = (method, *(old for old, new in FORMER_METHODS.items() if new == method))
         table, parameter = tables.identification, tables.parameter
         query = (
@@ -143,7 +143,7 @@ class History:
         return tuple(point for point in points if point is not None)
 
     def valves(self) -> tuple[KeptValve, ...]:
-        """Return all valves, by name."""
+        """Return all valves, sorted by name."""
         with reading(self.place) as connection:
             rows = connection.execute(sa.select(tables.valve.c.name, tables.valve.c.tag))
             return tuple(sorted(KeptValve(*row) for row in rows))
@@ -154,9 +154,9 @@ class History:
         since: int = -_END_OF_TIME,
         until: int = _END_OF_TIME,
     ) -> tuple[HistoryEntry, ...]:
-        """Return identifications, oldest first, of these valves or of all.
+        """Return the identifications of these valves, or of all, oldest first.
 
-        They lie from `since` on and before `until`, ns since 1970 (UTC).
+        Their times are from `since` to before `until`, ns since 1970 (UTC).
         """
         with reading(self.place) as connection:
             return entries_in(connection, valves, since, until)
@@ -164,11 +164,11 @@ class History:
 
 @dataclass(frozen=True)
 class HistoryFile(History):
-    """A history in SQLite.
+    """A history in an SQLite file.
 
-    Every method opens the file, so it may be moved, repaired or missing between two calls. Each
-    change is one transaction: a killed process leaves the change complete or absent, and
-    the file intact. All methods raise HistoryError if the file cannot be read or written.
+    Every method opens the file anew, so it may be moved, repaired or missing between two calls.
+    Each change is one transaction: a killed process leaves the change complete or absent, and the
+    file intact. All methods raise HistoryError if the file cannot be read or written.
 
     Attributes
     ----------
@@ -186,16 +186,16 @@ class HistoryFile(History):
     def prepare(self) -> None:
         """Create the file if it is missing, and check that it can be written.
 
-        A file that another process is writing at the moment is not waited for, unless it is older.
+        This does not wait for a process that is writing the file, unless the file needs an update.
         """
         if not is_ready(self.path):
             with writing(self.path):
                 pass
 
     def add(self, entry: HistoryEntry, days: float = 0.0) -> None:
-        """Add an identification; delete those of its valve that are `days` older, none for 0.
+        """Add an identification; delete rows of its valve more than `days` older (0: none).
 
-        The newest baseline and the last success stay, at any age.
+        The newest baseline and the last success stay at any age.
         """
         with writing(self.path) as connection:
             valve = valve_id(connection, entry.valve)
@@ -204,13 +204,13 @@ class HistoryFile(History):
                 _forget(connection, valve, oldest_kept(entry.time, days))
 
     def set_baseline(self, valve: KeptValve, kept: KeptBaseline) -> None:
-        """Make this the baseline of a valve."""
+        """Store a change of the baseline of a valve."""
         with writing(self.path) as connection:
             insert_baseline(connection, valve_id(connection, valve), kept)
 
 
 def _forget(connection: Connection, valve: int, before: int) -> None:
-    """Delete the rows of a valve from before a time (ns), and settings without a reference."""
+    """Delete the rows of a valve before a time (ns), and settings that are no longer used."""
     entry, baseline = tables.identification, tables.baseline
     last_success = sa.select(sa.func.max(entry.c.id)).where(
         entry.c.valve_id == valve, entry.c.refusal.is_(None)
@@ -231,11 +231,11 @@ def _forget(connection: Connection, valve: int, before: int) -> None:
     )
 
 
-# Ratios of a plant's valves, read from where one has stopped before
+# Ratios of the valves of a plant, read on from the last row read
 
 
 class KeptRatio(NamedTuple):
-    """Friction of a valve over its baseline, and the row, valve's name and time (ns) of it."""
+    """Friction of a valve over its baseline, with row, name of the valve and time (ns)."""
 
     row: int
     valve: str
@@ -244,11 +244,12 @@ class KeptRatio(NamedTuple):
 
 
 class HistoryMark(NamedTuple):
-    """Last identification, baseline and step of an alarm of a file; numbers of recordings, valves.
+    """Mark of the content of a history: its last rows, and numbers of recordings and valves.
 
-    It changes when one of these is added; usage and moves, which are written often, leave it. Where
-    it is not `settled`, a row may still come before the last one: several write to a server, and
-    one that has begun earlier may end later. `database` tells a server's database from another one.
+    The last rows are those of identification, baseline and alarm event. The mark changes when any
+    of these is added, but not with usage and moves, which are written often. If it is not
+    `settled`, rows may still appear before the last row: a transaction on a server may begin
+    earlier and end later than another. `database` identifies the database of a server.
     """
 
     identification: int
@@ -261,9 +262,9 @@ class HistoryMark(NamedTuple):
 
 
 def history_mark(file: History) -> HistoryMark:
-    """Return the mark of a file as it is now.
+    """Return the present mark of a history.
 
-    Raises HistoryError if the file cannot be read.
+    Raises HistoryError if it cannot be read.
     """
     with reading(file.place) as connection:
 
@@ -288,9 +289,9 @@ def history_mark(file: History) -> HistoryMark:
 
 
 def ratios_after(file: History, row: int, since: int) -> tuple[KeptRatio, ...]:
-    """Return the ratios of all valves in rows after one, made since a time, ns; oldest row first.
+    """Return the ratios of all valves after a row and since a time, ns; oldest row first.
 
-    Raises HistoryError if the file cannot be read.
+    Raises HistoryError if the history cannot be read.
     """
     table = tables.identification
     query = (

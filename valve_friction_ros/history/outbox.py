@@ -7,10 +7,10 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The way from a file to a server: rows wait in the file until the server has them.
+"""Transfer from a file to a server: rows wait in the file until the server has them.
 
-Triggers make each row wait that is added, changed or deleted, in the transaction that does so. One
-thread of a process, and one process of a machine, sends them; sent twice is sent once.
+Triggers queue each row that is added, changed or deleted, within the same transaction. One thread
+in one process per machine sends the rows. Sending a row twice has no effect.
 """
 
 import contextlib
@@ -50,16 +50,16 @@ from valve_friction_ros.history.rows import valve_id
 from valve_friction_ros.history.tables import FILE_METADATA, has_table, put, unsent
 
 _VALVE = "valve"
-"""The part of a row of the valve itself, of which the tag may have changed."""
+"""The part for a row of the valve table itself, whose tag may have changed."""
 
 _NOW = "CAST(strftime('%s', 'now') AS INTEGER)"
 
 _MANY = 500
-"""Rows of a transaction."""
+"""Rows per transaction."""
 
 
 class Unsent(NamedTuple):
-    """A row that waits, by its number among those that wait, with its valve, part and key."""
+    """A waiting row: its number in the queue, and its valve, part and key."""
 
     number: int
     valve: int
@@ -68,7 +68,7 @@ class Unsent(NamedTuple):
 
 
 class UnsentCount(NamedTuple):
-    """How many rows wait, since when (s since 1970, UTC), and how many the server refuses."""
+    """Number of waiting rows, since when (s since 1970, UTC), and number of refused rows."""
 
     waiting: int
     since: int | None
@@ -77,11 +77,11 @@ class UnsentCount(NamedTuple):
 
 _NONE_WAIT = UnsentCount(0, None, 0)
 
-# The list of a file
+# The queue in a file
 
 
 def _triggers() -> list[str]:
-    """Return the statements by which each change of a row makes it wait."""
+    """Return the statements that create the triggers, which queue each change of a row."""
     found = [_trigger(_VALVE, (), event, "NEW", "id") for event in ("INSERT", "UPDATE")]
     events = (("INSERT", "NEW"), ("UPDATE", "NEW"), ("DELETE", "OLD"))
     for part in PARTS:
@@ -104,7 +104,7 @@ def _trigger(table: str, key: Sequence[str], event: str, row: str, valve: str = 
 
 
 def _fill(file: Connection) -> None:
-    """Have all rows wait."""
+    """Queue all rows."""
     file.execute(sa.delete(unsent))
     _have_wait(file, tables.valve.c.id, _VALVE, ())
     for part in PARTS:
@@ -125,18 +125,18 @@ def _have_wait(
 
 
 def _not_followed(file: Connection) -> list[Part]:
-    """Return the parts whose changes do not wait: a newer version has added them."""
+    """Return the parts without triggers, which a newer version has added."""
     query = "SELECT name FROM sqlite_master WHERE type = 'trigger'"
     there = {name for (name,) in file.exec_driver_sql(query)}
     return [part for part in PARTS if f"unsent_{part.name}_insert" not in there]
 
 
 def follow(path: Path) -> None:
-    """Have all rows, and each change from now on, wait for a server, unless that is so already.
+    """Queue all rows and each later change for a server, unless this is set up already.
 
     Raises HistoryError if the file cannot be written.
     """
-    with contextlib.suppress(HistoryError), reading(path) as file:  # writing says what is wrong
+    with contextlib.suppress(HistoryError), reading(path) as file:  # writing reports the error
         if has_table(file, unsent) and not _not_followed(file):
             return
     with writing(path) as file:
@@ -153,7 +153,7 @@ def follow(path: Path) -> None:
 
 
 def count_unsent(path: Path) -> UnsentCount:
-    """Count the rows that wait; there are none in a file that is not followed."""
+    """Count the waiting rows; none in a file that is not followed."""
     counted = sa.select(
         sa.func.count(), sa.func.min(unsent.c.since), sa.func.count(unsent.c.refusal)
     )
@@ -173,7 +173,7 @@ def _has_unsent(file: Connection, valve: int) -> bool:
 
 
 class _Batch(NamedTuple):
-    """Rows that wait, as they are now, by their numbers; None for one that is gone."""
+    """Waiting rows in their present state, by number; None for a deleted row."""
 
     waiting: Sequence[Unsent]
     rows: Mapping[int, CopiedRow | None]
@@ -181,7 +181,7 @@ class _Batch(NamedTuple):
 
 
 def _batch(path: Path, after: int) -> _Batch:
-    """Read the first rows that wait, and are not refused, of numbers after one."""
+    """Read the first waiting rows with numbers beyond `after`, without refused rows."""
     first = (
         sa.select(unsent.c.number, unsent.c.valve_id, unsent.c.part, unsent.c.key)
         .where(unsent.c.number > after, unsent.c.refusal.is_(None))
@@ -208,7 +208,7 @@ def _batch(path: Path, after: int) -> _Batch:
 
 
 def send(path: Path, server: HistoryServer, is_over: Callable[[], bool]) -> None:
-    """Send the rows of a followed file that wait, some at least, until `is_over`.
+    """Send the waiting rows of a followed file, at least one batch, until `is_over`.
 
     Raises HistoryError if file or server cannot be read or written.
     """
@@ -222,12 +222,12 @@ def send(path: Path, server: HistoryServer, is_over: Callable[[], bool]) -> None
         except RowRefusedError:
             _deliver_one_by_one(path, server, batch)
         after = batch.waiting[-1].number
-        if is_over() or len(batch.waiting) < _MANY:  # what comes meanwhile is sent in a second
+        if is_over() or len(batch.waiting) < _MANY:  # the next look sends newer rows
             return
 
 
 def _send_to(path: Path, identity: str) -> None:
-    """Note which server gets the rows; all wait for it where another one has got them so far."""
+    """Note which server gets the rows; queue all rows if another server got them before."""
     with reading(path) as file:
         noted = marked(file, "sent_to")
     if noted != identity:
@@ -243,12 +243,12 @@ def _deliver(path: Path, server: HistoryServer, batch: _Batch) -> None:
         for part in PARTS:
             _deliver_part(new, part, there, batch)
     sent = [one.number for one in batch.waiting]
-    with writing(path) as file:  # a row that has changed since has another number, and stays
+    with writing(path) as file:  # a row changed since then has another number, and stays
         file.execute(sa.delete(unsent).where(unsent.c.number.in_(sent)))
 
 
 def _rows_of_valves(new: Connection, valves: Mapping[int, KeptValve]) -> dict[int, int]:
-    """Return the rows that valves have on the server, by their rows in the file."""
+    """Return the rows of valves on the server, by their rows in the file."""
     named = tables.valve.c.name.in_([one.name for one in valves.values()])
     known = {
         KeptValve(row.name, row.tag): row.id
@@ -268,7 +268,7 @@ def _deliver_part(new: Connection, part: Part, there: Mapping[int, int], batch: 
 
 
 def _deliver_one_by_one(path: Path, server: HistoryServer, batch: _Batch) -> None:
-    """Send what can be sent of rows among which the server refuses some, and note which."""
+    """Send rows one by one, and note which rows the server refuses."""
     for one in batch.waiting:
         try:
             _deliver(path, server, batch._replace(waiting=[one]))
@@ -279,10 +279,10 @@ def _deliver_one_by_one(path: Path, server: HistoryServer, batch: _Batch) -> Non
 
 
 def take(path: Path, server: HistoryServer, valve: KeptValve, is_over: Callable[[], bool]) -> None:
-    """Take the rows of a valve from the server, where another file has kept it since.
+    """Take the rows of a valve from the server if another file has kept the valve since.
 
-    Nothing is taken if rows of it wait here, or once `is_over`. Raises HistoryError if file or
-    server cannot be read or written.
+    Nothing is taken if rows of the valve wait here, or once `is_over`. Raises HistoryError if file
+    or server cannot be read or written.
     """
     with reading(path) as file:  # a copy on another machine is another file
         name = f"{marked(file, 'identity') or ''}@{socket.gethostname()}"
@@ -299,7 +299,7 @@ def take(path: Path, server: HistoryServer, valve: KeptValve, is_over: Callable[
 def _put_into(
     path: Path, valve: KeptValve, there: Connection, number: int, is_over: Callable[[], bool]
 ) -> bool:
-    """Put the rows of a valve into the file in one transaction; tell whether that was done."""
+    """Put the rows of a valve into the file in one transaction; return whether this was done."""
     taken = [(one, [*rows_of(there, one, one.table.c.valve_id == number)]) for one in PARTS]
     with writing(path) as file:
         here = valve_id(file, valve)
@@ -316,33 +316,33 @@ def _put_into(
 # The thread
 
 _PAUSE = 1.0
-"""Time, s, between two looks at the file. Chosen: a person does not wait for a row."""
+"""Time, s, between two looks at the file. Chosen: nobody waits for a row."""
 
 _LONGEST_PAUSE = 30.0
-"""Longest time, s, between two tries. Chosen: a server that returns is not overrun."""
+"""Longest time, s, between two attempts. Chosen: a server that returns is not overloaded."""
 
 _TAKING = 10.0
-"""Time, s, that nodes of a process wait for the server at their start, all together. Chosen."""
+"""Time, s, that all nodes of a process together wait for the server at their start. Chosen."""
 
 _ENDING = 2.0
-"""Time, s, for which the end of a node waits for what is sent. Chosen: the rest is in the file."""
+"""Time, s, that the end of a node waits for rows being sent. Chosen: the rest is in the file."""
 
 _PLACE = "sender"
-"""By what processes of one machine agree which of them sends."""
+"""Name of the claim that decides which process of a machine sends."""
 
 
 @dataclass(frozen=True)
 class SentState:
-    """What a sender knows.
+    """State of a sender.
 
     Attributes
     ----------
     count : UnsentCount
-        Rows that wait.
+        Waiting rows.
     problem : str or None
-        Why they are not sent; None: they are.
+        Why the rows are not sent; None if they are.
     is_sending : bool
-        Whether this process sends the rows of the file; else another one does.
+        Whether this process sends the rows of the file; else another process does.
     """
 
     count: UnsentCount = _NONE_WAIT
@@ -351,10 +351,10 @@ class SentState:
 
 
 class Sender:
-    """Sends what is new in a file to a server, and takes the rows of valves that come from there.
+    """Sends new rows of a file to a server, and takes rows of valves from the server.
 
-    What is not sent waits in the file, so nothing is lost by whatever ends. One process of a
-    machine sends the rows of a file.
+    Unsent rows wait in the file, so nothing is lost if a process, server or network fails. One
+    process per machine sends the rows of a file.
 
     Parameters
     ----------
@@ -366,9 +366,9 @@ class Sender:
     Attributes
     ----------
     state : SentState
-        What is known now.
+        The present state.
     users : int
-        Nodes that have not ended it.
+        Number of nodes that use it.
     """
 
     def __init__(self, path: Path, server: HistoryServer) -> None:
@@ -384,10 +384,10 @@ class Sender:
         self._thread.start()
 
     def take(self, valve: KeptValve) -> str | None:
-        """Take the rows of a valve from the server, where another file has kept it since.
+        """Take the rows of a valve from the server if another file has kept the valve since.
 
-        Returns why that could not be done, or None. It waits some seconds at most, for all valves
-        of a process together.
+        Returns the cause of a failure, or None. It waits some seconds at most, for all valves of a
+        process together.
         """
         done: Future[None] = Future()
         patience = max(_PAUSE, self._begun + _TAKING - time.monotonic())
@@ -405,7 +405,7 @@ class Sender:
         return None
 
     def news(self) -> str | None:
-        """Return once what has changed between file and server, in words."""
+        """Return, once, a message about a change in the transfer to the server, or None."""
         problem = self.state.problem
         if problem == self._told:
             return None
@@ -415,7 +415,7 @@ class Sender:
         return f"the history waits in {self._path}: {problem}"
 
     def end(self) -> None:
-        """Send what can be sent at once, and stop, where no other node of the process goes on."""
+        """Release the sender; the last node to do so sends what it can at once and stops it."""
         with _lock:
             self.users -= 1
             if self.users > 0:
@@ -448,7 +448,7 @@ class Sender:
         return waits or state.problem is not None or not state.is_sending
 
     def _problem_of_cycle(self) -> str | None:
-        """Send and take what there is, and note the state; return what has prevented it."""
+        """Send and take rows, and note the state; return the cause of a failure, or None."""
         problem, count = None, self.state.count
         try:
             self._cycle()
@@ -488,7 +488,7 @@ _lock = threading.Lock()
 
 
 def sender_of(path: Path, server: HistoryServer) -> Sender:
-    """Return the sender of a file, which all nodes of the process share; each calls `end`."""
+    """Return the sender that all nodes of a process share for a file; each node calls `end`."""
     with _lock:
         key = (path.absolute(), server)
         one = _senders.get(key)

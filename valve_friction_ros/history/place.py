@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Where a history is, a file or a server, and who keeps it: what is known without a database."""
+"""Location of a history, a file or a server, and claims on it; needs no database."""
 
 import fcntl
 import hashlib
@@ -20,14 +20,14 @@ from typing import NamedTuple
 from urllib.parse import parse_qsl, unquote, urlsplit
 
 URL_VARIABLE = "VALVE_FRICTION_HISTORY_URL"
-"""The variable of the environment that names the server, also with a password."""
+"""Environment variable with the address of the server, which may include a password."""
 
 _SCHEMES = ("postgresql", "postgres")
 _HIDDEN = "***"
 
 
 def is_url(text: str) -> bool:
-    """Return whether a text is the address of a server, and no path."""
+    """Return whether a text is the address of a server rather than a path."""
     return text.partition("://")[0].lower() in _SCHEMES and "://" in text
 
 
@@ -35,19 +35,19 @@ def is_url(text: str) -> bool:
 class HistoryServer:
     """A history in PostgreSQL.
 
-    As text it has user, host and database, and nothing that may be secret.
+    Its text shows user, host and database, and nothing that may be secret.
 
     Attributes
     ----------
     url : str
-        Address as PostgreSQL's own clients read it: ``postgresql://user@host/database``, with
-        their parameters such as ``?sslmode=verify-full``.
+        Address as PostgreSQL clients read it: ``postgresql://user@host/database``, with parameters
+        such as ``?sslmode=verify-full``.
     """
 
     url: str = field(repr=False)
 
     def __post_init__(self) -> None:
-        """Refuse an address that is none, without repeating it."""
+        """Refuse an invalid address without repeating it."""
         if not is_url(self.url) or not self.url.isprintable() or " " in self.url:
             raise ValueError("no address of a server: write it as postgresql://user@host/database")
         try:
@@ -59,7 +59,7 @@ class HistoryServer:
             ) from None
 
     def __str__(self) -> str:
-        """Return it without password and parameters."""
+        """Return the address without password and parameters."""
         parts = urlsplit(self.url)
         user, at, hosts = parts.netloc.rpartition("@")
         name = user.partition(":")[0]
@@ -67,7 +67,7 @@ class HistoryServer:
 
     @property
     def secrets(self) -> tuple[str, ...]:
-        """The passwords in it, as they are written and as they are meant."""
+        """Passwords in the address, encoded and decoded."""
         parts = urlsplit(self.url)
         written = [parts.netloc.rpartition("@")[0].partition(":")[2]]
         pairs = [one.partition("=") for one in parts.query.split("&")]
@@ -77,7 +77,7 @@ class HistoryServer:
         return tuple(sorted(filter(None, found), key=len, reverse=True))
 
     def without_secrets(self, text: str) -> str:
-        """Return a text in one line, without the password of this address."""
+        """Return a text in one line, without the passwords of this address."""
         for secret in (self.url, *self.secrets):
             text = text.replace(secret, _HIDDEN)
         return " ".join(text.split())
@@ -86,9 +86,9 @@ class HistoryServer:
 def server_from(
     url: str, name: str = "history_url", environment: Mapping[str, str] = os.environ
 ) -> HistoryServer | None:
-    """Return the server of a parameter of this `name`, else of the environment; None for none.
+    """Return the server of the parameter `name`, else of the environment, or None.
 
-    Raises ValueError, without the address, if it is none, or if the parameter holds a password.
+    Raises ValueError, without the address, if it is invalid or if the parameter holds a password.
     """
     url = url.strip()
     place = name if url else URL_VARIABLE
@@ -108,7 +108,7 @@ def server_from(
 
 
 Place = Path | HistoryServer
-"""Where a history is."""
+"""Location of a history."""
 
 
 class HistoryError(Exception):
@@ -116,11 +116,11 @@ class HistoryError(Exception):
 
 
 class RowRefusedError(HistoryError):
-    """A server refuses a row by its content, and would do so each time."""
+    """A server refuses a row for its content, and would do so each time."""
 
 
 class FileStamp(NamedTuple):
-    """When a file was changed (ns), its size and its number; zeros where it is not there."""
+    """Time of the last change (ns), size and inode number of a file; zeros if it is missing."""
 
     time: int = 0
     size: int = 0
@@ -136,12 +136,12 @@ def _stamp_of(path: Path) -> FileStamp:
 
 
 def file_state(path: Path) -> tuple[FileStamp, FileStamp]:
-    """Return the stamps of a history and of its journal: one changes when the history does."""
+    """Return the stamps of a history and its journal; a change of the history changes either."""
     return _stamp_of(path), _stamp_of(path.with_name(f"{path.name}-wal"))
 
 
 _CLAIMS_ENDING = "-nodes"
-"""Ending of the file of the claims, after the name of the history; it has no content."""
+"""Suffix of the claims file after the name of the history; the file has no content."""
 
 _CLAIM_PLACES = 2**62
 
@@ -149,8 +149,9 @@ _CLAIM_PLACES = 2**62
 class Claim:
     """A claim on the history of one valve, which ends with its process, however that ends.
 
-    It is a lock of one byte of a file beside the history, whose place follows from the name of the
-    valve. Where the system has no such locks, or the file cannot be made, every claim is granted.
+    It is a lock on one byte of a file next to the history, at a position computed from the name of
+    the valve. If the system has no such locks, or the file cannot be created, every claim is
+    granted.
 
     Parameters
     ----------
@@ -168,7 +169,7 @@ class Claim:
         self.is_granted = False
 
     def ask(self) -> bool:
-        """Ask for it, unless it is granted already; tell if it is."""
+        """Ask for the claim unless it is already granted; return whether it is."""
         if not self.is_granted:
             self.is_granted = self._locked()
         return self.is_granted
@@ -189,7 +190,7 @@ class Claim:
         return True
 
     def release(self) -> None:
-        """Give it back."""
+        """Release the claim."""
         self.is_granted = False
         if self._file is not None:
             os.close(self._file)

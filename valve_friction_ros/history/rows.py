@@ -79,14 +79,14 @@ _OF_ENTRY = (
     "baseline_sliding_speed",
 )
 _OF_REPLACED = tuple(f"replaced_{name}" for name in _OF_BASELINE)
-"""Columns of a baseline: in its table, in that of the identifications, and as the one before."""
+"""Columns of a baseline: in its own table, in that of identifications, and as a replaced one."""
 
 _NUMBERS = {"baseline": tables.baseline_number, "identification": tables.identification_number}
 
 
 T = TypeVar("T")
 
-# A value is a row by the names of its fields; some columns have another name, or there is none.
+# Fields of a value are columns of the same name; some columns have another name or do not exist.
 
 _COLUMNS: dict[type, dict[str, str | None]] = {
     AlarmRecording: {"time": "time_ns"},
@@ -112,7 +112,7 @@ _READERS: dict[Any, Callable[[Any], Any]] = {
 
 
 def _stored(kind: Any) -> Iterator[tuple[str, str, Any]]:
-    """Yield field, column and type of what is kept of a type."""
+    """Yield name, column and type of each stored field of a type."""
     names = _COLUMNS.get(kind, {})
     for one in fields(kind):
         if (column := names.get(one.name, one.name)) is not None:
@@ -120,7 +120,7 @@ def _stored(kind: Any) -> Iterator[tuple[str, str, Any]]:
 
 
 def columns_of(one: Any, kind: Any = None) -> dict[str, Any]:
-    """Return the columns of a value, or of one of a `kind` that may be missing, all None then."""
+    """Return the columns of a value; if it is None, the columns of its `kind`, all None."""
     return {
         column: None if one is None else _WRITERS.get(of, lambda value: value)(getattr(one, name))
         for name, column, of in _stored(kind or type(one))
@@ -128,13 +128,13 @@ def columns_of(one: Any, kind: Any = None) -> dict[str, Any]:
 
 
 def value_of(kind: Callable[..., T], row: RowMapping, **more: Any) -> T:
-    """Return the value of a type that is in a row, with `more` of its fields."""
+    """Return the value of a type from a row, with `more` of its fields."""
     found = {name: _READERS.get(of, of)(row[column]) for name, column, of in _stored(kind)}
     return kind(**found | more)
 
 
 def valve_id(connection: Connection, valve: KeptValve) -> int:
-    """Return the row of a valve, with its tag updated."""
+    """Return the row of a valve, added if it is new, with its tag updated."""
     row = connection.execute(_VALVE, {"named": valve.name}).first()
     if row is None or row.tag != valve.tag:
         put(connection, tables.valve, [{"name": valve.name, "tag": valve.tag}])
@@ -147,7 +147,7 @@ _SETTINGS = sa.select(tables.settings.c.id).where(tables.settings.c.content == s
 
 
 def settings_id(connection: Connection, text: str) -> int:
-    """Return the row of settings, which are added where they are new."""
+    """Return the row of settings, added if they are new."""
     if (row := connection.scalar(_SETTINGS, {"text": text})) is None:
         put(connection, tables.settings, [{"content": text}], is_kept=True)
         row = connection.execute(_SETTINGS, {"text": text}).scalar_one()
@@ -155,9 +155,9 @@ def settings_id(connection: Connection, text: str) -> int:
 
 
 def oldest_kept(newest: int, days: float) -> int:
-    """Return the time, ns, before which rows leave that are `days` older than the newest one.
+    """Return the time, ns, before which rows are more than `days` older than the newest row.
 
-    A newest row that is ahead of the clock of this machine ages none.
+    If the newest row is ahead of the clock of this machine, the clock is used instead.
     """
     return min(newest, time.time_ns()) - round(days * DAY)
 
@@ -308,13 +308,13 @@ def numbers_in(
 
 
 _FARTHEST = {"lowest_position": ("lower_stop", False), "highest_position": ("upper_stop", True)}
-"""Ends of the stem's motion: the stop beside each, and whether the farthest is the largest."""
+"""Ends of the stem motion: the adjacent stop, and whether the farthest value is the largest."""
 
 
 def known_numbers_in(connection: Connection, name: str, valve: Valve, since: int) -> KnownNumbers:
-    """Return what the identifications of a valve since a time (ns) say of it (`KnownNumbers`).
+    """Return the numbers of a valve from its identifications since a time, ns (`KnownNumbers`).
 
-    Those made with other parameters of the valve do not count.
+    Identifications with other parameters of the valve are ignored.
     """
     same = json.dumps(plain(vars(valve)), sort_keys=True)
     settings = [
@@ -354,7 +354,7 @@ def _number(value: float | None) -> float:
 
 
 _PLACES = {name: place for place, name in enumerate(PARAMETER_UNITS)}
-"""Places of the parameters in a result; of any other one after them."""
+"""Positions of the parameters in a result; any other parameter follows them."""
 
 
 def _parameter(row: RowMapping) -> Parameter:
@@ -395,7 +395,7 @@ def _entry(
 def frictions_in(
     rows: Sequence[RowMapping],
 ) -> Iterator[tuple[int, dict[str, Parameter], float]]:
-    """Gather rows of parameters, each with its identification: time, parameters, sliding speed."""
+    """Yield time, parameters and sliding speed of each identification from parameter rows."""
     for _, some in groupby(rows, key=lambda row: row["identification_id"]):
         several = [*some]
         parameters = {row["name"]: _parameter(row) for row in several}
@@ -443,11 +443,11 @@ def _entries_of_valve(
         yield _entry(row, ordered, numbers.get(row["id"], {}))
 
 
-# The diagnosis: its state, and an alarm that stands
+# The diagnosis: its state, and a standing alarm
 
 
 def state_columns(diagnosis: Diagnosis) -> dict[str, Any]:
-    """Return the columns of the state of a diagnosis; None where there is nothing to say."""
+    """Return the columns of the state of a diagnosis; None where there is no entry."""
     doubt, alarm, latest = diagnosis.own.doubt, diagnosis.alarm, diagnosis.latest
     columns: dict[str, Any] = {
         "state": diagnosis.state.name,
@@ -474,8 +474,8 @@ def _diagnosis_in(
 ) -> Diagnosis:
     """Return the diagnosis in a row of any version.
 
-    `is_below_zero` tells of a friction that the record found there. Raises ValueError for a state
-    that nobody knows.
+    `is_below_zero` says that a parameter of the record is negative. Raises ValueError for an
+    unknown state.
     """
     level, signal = Level(row["level"]), StatusSignal(row["status_signal"])
     if row["state"] is None:
@@ -496,7 +496,7 @@ def _diagnosis_in(
 
 
 def _statement(row: RowMapping, kept: Mapping[str, Any], column: str) -> Statement:
-    """Return a statement of a row; one of version 8 has its sentence only."""
+    """Return a statement of a row; a row of version 8 holds only its sentence."""
     return Statement.from_dict(kept[column]) if column in kept else _quoted(row[column])
 
 
@@ -509,7 +509,7 @@ _FORMER_STATES = {
     "PERHAPS_GROWN": FrictionState.UNCLEAR,
     "PERHAPS_FALLEN": FrictionState.UNCLEAR,
 }
-"""States of a friction that versions 8 and before have kept, and what they are now."""
+"""States of a friction in versions 8 and earlier, and their present states."""
 
 
 def _state(name: str) -> FrictionState:
@@ -519,8 +519,8 @@ def _state(name: str) -> FrictionState:
         raise ValueError(f"{name!r} is no state of a friction") from None
 
 
-# Rows of before version 9 have what is said in their sentences only, and those of before version 8
-# the state of the friction and an alarm that stands, too. Nothing else reads a sentence.
+# Rows before version 9 hold statements only as sentences. Rows before version 8 also hold the state
+# of the friction and a standing alarm only as sentences. No other code reads a sentence.
 
 _DOUBT = "the Karnopp model does not describe this valve"
 _LINK = "; the latest record cannot be compared: "
@@ -551,7 +551,7 @@ def _of_former_version(
     limits: FrictionLimits,
     is_below_zero: bool,
 ) -> Diagnosis:
-    """Return the diagnosis in a row of before version 8, with its state and alarm."""
+    """Return the diagnosis in a row from before version 8, with its state and alarm."""
     raised, stood, of_record = message.partition(_LINK)
     if not stood:
         state = _BY_SIGNAL.get(signal, FrictionState.UNKNOWN)

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The valve in service as rows of the history: usage, moves, answers, alarms, notified level.
+"""The valve in service as rows of the history: usage, moves, responses, alarms, notified level.
 
 All functions raise HistoryError if the history cannot be read or written.
 """
@@ -37,7 +37,7 @@ from valve_friction_ros.usage import Usage, UsedDay, ValveUsage, total
 
 
 def _of_valve(table: sa.Table, valve: str, *order: Any) -> Any:
-    """Return what selects the rows of the valve of a name."""
+    """Return a query for the rows of the valve of this name."""
     query = sa.select(table).select_from(joined(table, tables.valve))
     return query.where(tables.valve.c.name == valve).order_by(*order)
 
@@ -61,12 +61,12 @@ class _Rows(NamedTuple):
         self.connection.execute(sa.delete(table).where(of_valve, *which))
 
     def drop_older(self, stamp: sa.Column[Any], newest: int, days: float) -> None:
-        """Drop the rows whose stamps are `days` older than one, ns; none for 0."""
+        """Drop the rows whose stamps are more than `days` older than `newest`, ns (0: none)."""
         if days > 0:
             self.drop(stamp.table, stamp < oldest_kept(newest, days))
 
     def drop_beyond(self, column: sa.Column[Any], most: int) -> None:
-        """Drop all rows but the `most` with the largest values of a column."""
+        """Drop all rows except the `most` with the largest values of a column."""
         of_valve = column.table.c.valve_id == self.valve
         last = sa.select(column).where(of_valve).order_by(column.desc()).limit(1).offset(most)
         self.drop(column.table, column <= last.scalar_subquery())
@@ -84,7 +84,7 @@ def _rows_of(file: HistoryFile, valve: KeptValve) -> Iterator[_Rows]:
 def keep_alarm_recording(
     file: HistoryFile, valve: KeptValve, one: AlarmRecording, days: float = 0.0
 ) -> None:
-    """Keep that an alarm was recorded; delete those of its valve `days` older, none for 0."""
+    """Store an alarm recording; delete those of its valve more than `days` older (0: none)."""
     table = tables.alarm_recording
     with _rows_of(file, valve) as rows:
         rows.drop(table, table.c.time_ns == one.time)
@@ -99,22 +99,22 @@ def alarm_recordings(file: History, valve: str) -> tuple[AlarmRecording, ...]:
 
 
 def keep_told_level(file: HistoryFile, valve: KeptValve, level: Level) -> None:
-    """Keep the level that was told last."""
+    """Store the level that was last notified."""
     with _rows_of(file, valve) as rows:
         rows.put(tables.told_level, {"level": int(level)})
 
 
 def read_told_level(file: History, valve: str) -> Level | None:
-    """Return the level that was told last of the valve of this name, if any."""
+    """Return the last notified level of the valve of this name, if any."""
     with reading(file.place) as connection:
         row = connection.execute(_of_valve(tables.told_level, valve)).first()
         return None if row is None else Level(row.level)
 
 
-# Answers to the command
+# Responses to the command
 
 _MOST_ANSWERS = 2000
-"""Answers of a valve that are kept, the latest."""
+"""Number of latest responses that are stored per valve."""
 
 
 def keep_answers(
@@ -124,10 +124,10 @@ def keep_answers(
     moves: Sequence[StepAnswer],
     days: float = 0.0,
 ) -> None:
-    """Add answers of a stem with this travel, m, oldest first; keeping them twice changes nothing.
+    """Add responses of a stem with this travel, m, oldest first; a repetition changes nothing.
 
-    Those go that are `days` older than the last one, none for 0, and all but the 2000 kept last; a
-    stamp ahead of the clock of this machine ages none.
+    Responses more than `days` older than the last are deleted (0: none), and so are all but the
+    latest 2000. A stamp ahead of the clock of this machine deletes no more than the clock does.
     """
     if not moves:
         return
@@ -139,9 +139,9 @@ def keep_answers(
 
 
 def read_answers(file: History, valve: str, travel: float | None = None) -> tuple[StepAnswer, ...]:
-    """Return the answers of the valve of this name, in the order in which they were kept.
+    """Return the responses of the valve of this name, in the order of storage.
 
-    Only those with this travel, m, are returned; None: that of the last answer.
+    Only responses with this travel, m, are returned; None means the travel of the last response.
     """
     with reading(file.place) as connection:
         query = _of_valve(tables.answer, valve, tables.answer.c.id)
@@ -150,11 +150,11 @@ def read_answers(file: History, valve: str, travel: float | None = None) -> tupl
         return tuple(value_of(StepAnswer, row) for row in rows if row["travel"] == wanted)
 
 
-# Moves in service, and what they say together
+# Moves in service, and their combined result
 
 
 def _actuator(table: sa.Table, built: Valve) -> Any:
-    """Return what is true of rows that were computed with this area and pressure reference."""
+    """Return the condition for rows computed with this area and pressure reference."""
     area = table.c.diaphragm_area.is_not_distinct_from(built.diaphragm_area)
     return sa.and_(area, table.c.pressure_reference == built.pressure_reference)
 
@@ -167,10 +167,10 @@ def _with(built: Valve, one: Any) -> dict[str, Any]:
 def keep_moves(
     file: HistoryFile, valve: KeptValve, built: Valve, moves: Sequence[Move], days: float = 0.0
 ) -> None:
-    """Add moves of a valve, oldest first; keeping them twice changes nothing.
+    """Add moves of a valve, oldest first; a repetition changes nothing.
 
-    Those go that are `days` older than the last one, none for 0, and all but the newest
-    `MOST_MOVES`; a stamp ahead of the clock of this machine ages none.
+    Moves more than `days` older than the last are deleted (0: none), and so are all but the newest
+    `MOST_MOVES`. A stamp ahead of the clock of this machine deletes no more than the clock does.
     """
     if not moves:
         return
@@ -190,8 +190,7 @@ def forget_moves_after(file: HistoryFile, valve: KeptValve, time: int) -> None:
 def read_moves(file: History, valve: str, built: Valve) -> tuple[Move, ...]:
     """Return the moves of the valve of this name, oldest first.
 
-    Only those are returned whose forces were computed with the area and the pressure reference in
-    force.
+    Only moves whose forces were computed with the present area and pressure reference are returned.
     """
     table = tables.move
     query = _of_valve(table, valve, table.c.end_ns).where(_actuator(table, built))
@@ -199,7 +198,7 @@ def read_moves(file: History, valve: str, built: Valve) -> tuple[Move, ...]:
 
 
 def keep_reference(file: HistoryFile, valve: KeptValve, built: Valve, reference: Reference) -> None:
-    """Keep the first friction by the moves of a valve; a later one with its actuator is none."""
+    """Store the first friction from the moves of a valve; ignore later ones for this actuator."""
     table = tables.evidence_reference
     with _rows_of(file, valve) as rows:
         rows.drop(table, sa.not_(_actuator(table, built)))
@@ -208,7 +207,7 @@ def keep_reference(file: HistoryFile, valve: KeptValve, built: Valve, reference:
 
 
 def read_reference(file: History, valve: str, built: Valve) -> Reference | None:
-    """Return the first friction by the moves of the valve of this name, with this actuator."""
+    """Return the first friction from the moves of the valve of this name, with this actuator."""
     table = tables.evidence_reference
     with reading(file.place) as connection:
         query = _of_valve(table, valve).where(_actuator(table, built))
@@ -217,13 +216,13 @@ def read_reference(file: History, valve: str, built: Valve) -> Reference | None:
 
 
 def keep_change(file: HistoryFile, valve: KeptValve, built: Valve, change: FrictionChange) -> None:
-    """Keep the last change of friction that the moves of a valve show, in place of another."""
+    """Store the last change of friction from the moves of a valve; it replaces the previous."""
     with _rows_of(file, valve) as rows:
         rows.put(tables.evidence_change, _with(built, change))
 
 
 def read_change(file: History, valve: str, built: Valve) -> FrictionChange | None:
-    """Return the last change that the moves of the valve, with this actuator, have shown."""
+    """Return the last change of friction from the moves of the valve, with this actuator."""
     table = tables.evidence_change
     query = _of_valve(table, valve).where(_actuator(table, built))
     return next(iter(_all_of(FrictionChange, file, query)), None)
@@ -232,18 +231,18 @@ def read_change(file: History, valve: str, built: Valve) -> FrictionChange | Non
 # Usage
 
 _EARLIER_RUNS = ""
-"""Run whose rows are the sums of runs that have ended."""
+"""Name of the run whose rows are the sums of ended runs."""
 
 _OPEN_DAYS = 1
-"""Days before the newest whose rows stay apart: a run may write about midnight. Chosen."""
+"""Days before the newest whose rows stay separate: a run may write around midnight. Chosen."""
 
 
 def keep_usage(file: HistoryFile, valve: KeptValve, run: str, days: Iterable[UsedDay]) -> None:
-    """Keep what a run of an identifier has counted on some days; `run` is a name of its own.
+    """Store the usage that a run of an identifier has counted per day; `run` is a unique name.
 
-    The usage of a day is that of the whole run: it takes the place of what the run has kept of this
-    day before, so that keeping it twice changes nothing. What other runs have kept of days
-    before the newest two becomes one row per day: of a valve one run writes at a time.
+    The usage of a day covers the whole run. It replaces the previous usage of that day and run, so
+    a repetition changes nothing. The usage of other runs, before the newest two days, is summed to
+    one row per day, since only one run at a time writes for a valve.
     """
     with _rows_of(file, valve) as rows:
         rows.put(tables.usage, *(_used(run, one) for one in days))
@@ -256,7 +255,7 @@ def _used(run: str, one: UsedDay) -> dict[str, Any]:
 
 
 def _merge(rows: _Rows, run: str) -> None:
-    """Add up, for each finished day, the rows of all runs but this one."""
+    """Sum, for each finished day, the rows of all runs except this run."""
     table, connection = tables.usage, rows.connection
     of_valve, another = table.c.valve_id == rows.valve, table.c.run != run
     last = sa.select(sa.func.max(table.c.day)).where(of_valve).scalar_subquery()
@@ -270,17 +269,17 @@ def _merge(rows: _Rows, run: str) -> None:
     for renewal, day in connection.execute(several).all():
         chosen = (another, table.c.renewal_ns == renewal, table.c.day == day)
         found = connection.execute(sa.select(table).where(of_valve, *chosen)).mappings().all()
-        with contextlib.suppress(TypeError, ValueError):  # rows that hold no usage: reading says so
+        with contextlib.suppress(TypeError, ValueError):  # reading reports rows without usage
             merged = UsedDay(day, renewal, total(value_of(Usage, each) for each in found))
             rows.drop(table, *chosen)
             rows.put(table, _used(_EARLIER_RUNS, merged))
 
 
 def keep_renewal(file: HistoryFile, valve: KeptValve, time: int) -> None:
-    """Keep that the packing of a valve was renewed at a time, ns since 1970 (UTC).
+    """Store that the packing of a valve was renewed at a time, ns since 1970 (UTC).
 
-    The moves of the packing before go, their reference, and the answers to the command: they say
-    nothing of the new one.
+    Moves with the old packing, their reference and change, and responses to the command are
+    deleted: they do not apply to the new packing.
     """
     with _rows_of(file, valve) as rows:
         rows.put(tables.packing_renewal, {"time_ns": time}, is_kept=True)
@@ -300,13 +299,13 @@ def read_usage(file: History, valve: str) -> ValveUsage:
         return ValveUsage.of(days, renewed)
 
 
-# All that is kept of a valve
+# The complete history of a valve
 
 
 def valve_histories(
     history: History, valves: tuple[KeptValve, ...], since: int, until: int
 ) -> tuple[ValveHistory, ...]:
-    """Read the histories of some valves from `since` to `until`, ns; empty ones are left out."""
+    """Read the histories of several valves from `since` to `until`, ns, without empty ones."""
     found = []
     for valve in valves:
         entries = history.entries([valve.name], since, until)

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""What is known of a valve as texts under keys: the values of its status in `/diagnostics`."""
+"""Numbers and states of a valve as texts under keys: its status values in `/diagnostics`."""
 
 import math
 from collections.abc import Mapping
@@ -19,12 +19,12 @@ from valve_friction_ros.streams import utc, utc_day, utc_second
 
 
 def number_text(value: float | None) -> str:
-    """Write a number; nan where there is none."""
+    """Return a number as text; nan for None."""
     return f"{math.nan if value is None else value:.9g}"
 
 
 def ratio_values(ratio: Ratio | None, prefix: str = "") -> dict[str, str]:
-    """Return the values of a friction over its baseline, their keys after `prefix`."""
+    """Return the values of a friction over its baseline, with `prefix` before the keys."""
     if ratio is None:
         return {}
     return {
@@ -45,9 +45,9 @@ _EVIDENCE_UNITS = {
 
 
 def result_values(shown: Mapping[str, Any], band: float, half_width: float) -> dict[str, str]:
-    """Return what the diagnostic shows of a result, or of what is kept of one, as `to_dict`.
+    """Return the status values of a result, or of its history entry, given as `to_dict`.
 
-    The dead band and half its interval's width are shares of the travel.
+    The dead band and the half width of its interval are shares of the travel.
     """
     values: dict[str, str] = {}
     for name, parameter in shown["parameters"].items():
@@ -82,7 +82,7 @@ def result_values(shown: Mapping[str, Any], band: float, half_width: float) -> d
 
 
 def baseline_values(baseline: Baseline | None) -> dict[str, str]:
-    """Return the frictions of a baseline."""
+    """Return the status values of the frictions of a baseline."""
     values: dict[str, str] = {}
     if baseline is None:
         return values
@@ -97,7 +97,7 @@ def baseline_values(baseline: Baseline | None) -> dict[str, str]:
 
 
 def exact_time(time: int) -> str:
-    """Write a time, ns since 1970, by ISO 8601, as UTC."""
+    """Return a time, ns since 1970, in ISO 8601 as UTC."""
     return f"{utc(time):%Y-%m-%dT%H:%M:%S.%fZ}"
 
 
@@ -119,7 +119,7 @@ def trend_values(trend: Trend | None) -> dict[str, str]:
 
 
 def alarm_values(alarms: Mapping[AlarmKind, Alarm]) -> dict[str, str]:
-    """Return the state of each alarm, and what is known of those that are not normal."""
+    """Return the state of each alarm, with details of alarms that are not normal."""
     values = {}
     for kind in AlarmKind:
         alarm = alarms.get(kind, Alarm(kind))

@@ -7,14 +7,16 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The tables of the history, for SQLite and PostgreSQL alike, and what older ones lack.
+"""Tables of the history, for both SQLite and PostgreSQL, and differences of older versions.
 
-Version 1 has no published values, version 2 no sliding friction in baselines and ratios, and no
-half widths without calibration; version 3 has no records of baselines; version 4 does not say what
-a baseline replaced; version 5 knows nothing of the valve in service; version 6 has no keys that
-hold on several machines, and is the last one that servers never had; version 7 has the state of
-the friction and an alarm that stands in sentences only; version 8 has what is said of them so, and
-knows no life of an alarm.
+- Version 1 lacks published values.
+- Version 2 lacks sliding friction in baselines and ratios, and half widths without calibration.
+- Version 3 lacks records of baselines.
+- Version 4 lacks the replaced baseline.
+- Version 5 lacks the valve in service.
+- Version 6 lacks keys that are valid on several machines. It is the last version without servers.
+- Version 7 holds the state of the friction and a standing alarm only as sentences.
+- Version 8 holds statements about them only as sentences, and lacks alarm events.
 """
 
 from collections.abc import Sequence
@@ -33,14 +35,14 @@ METADATA = sa.MetaData()
 """The tables of a history."""
 
 FILE_METADATA = sa.MetaData()
-"""What a file has besides where its rows go to a server."""
+"""Further tables of a file whose rows go to a server."""
 
 _INTEGER: Any = sa.BigInteger().with_variant(sa.Integer(), "sqlite")
 _REAL: Any = sa.REAL().with_variant(postgresql.DOUBLE_PRECISION(), "postgresql")
 
 
 class _Text(sa.types.TypeDecorator[str]):
-    """A text; on a server without NUL, which no text of PostgreSQL has."""
+    """A text; on a server without NUL, which PostgreSQL does not allow."""
 
     impl = sa.Text
     cache_ok = True
@@ -86,7 +88,7 @@ def _valve(*, key: bool = False) -> sa.Column[Any]:
 
 
 def _owner(table: str) -> sa.Column[Any]:
-    """Return the column that names the row of a table to which a row belongs, and goes with it."""
+    """Return the column that refers to the owner of a row; the row is deleted with its owner."""
     owner = sa.ForeignKey(f"{table}.id", ondelete="CASCADE")
     return sa.Column(f"{table}_id", _INTEGER, owner, primary_key=True, autoincrement=False)
 
@@ -96,14 +98,14 @@ def _key(name: str, kind: Any = _INTEGER) -> sa.Column[Any]:
 
 
 def _table(name: str, *columns: sa.schema.SchemaItem, key: Sequence[str] = ()) -> sa.Table:
-    """Declare a table; `key` are the columns of its rows' identity where its primary key is not."""
+    """Declare a table; `key` names the identifying columns if they are not the primary key."""
     has_rows_of_size = name == "baseline_record"
     numbered = has_rows_of_size or any(getattr(one, "name", None) == "id" for one in columns)
     return sa.Table(name, METADATA, *columns, sqlite_with_rowid=numbered, info={"key": tuple(key)})
 
 
 def key_of(table: sa.Table) -> tuple[str, ...]:
-    """Return the columns by which the rows of a table are told apart."""
+    """Return the columns that identify the rows of a table."""
     return table.info["key"] or tuple(one.name for one in table.primary_key)
 
 
@@ -144,9 +146,9 @@ identification = _table(
     sa.Index("identification_uid", "valve_id", "uid", unique=True),
     key=["valve_id", "uid"],
 )
-"""An identification; where an alarm of an earlier record stands, that alarm and what the record
-says by itself (`latest_`). The `statements` are an object of JSON; the messages beside them are for
-people who read the table."""
+"""An identification. If an alarm of an earlier record stands, the row holds that alarm and the
+diagnosis of the record by itself (`latest_`). The `statements` are a JSON object; the messages are
+for people who read the table."""
 
 parameter = _table(
     "parameter",
@@ -179,7 +181,7 @@ baseline = _table(
     sa.Index("baseline_uid", "valve_id", "uid", unique=True),
     key=["valve_id", "uid"],
 )
-"""A change of a baseline: who set it, at which level, and what it replaced."""
+"""A change of a baseline: the service that set it, the level then, and the replaced baseline."""
 
 baseline_record = _table(
     "baseline_record",
@@ -188,7 +190,7 @@ baseline_record = _table(
     *_texts("driven_by"),
     *_some(sa.LargeBinary, "drive position", null=False),
 )
-"""Samples of the record of a baseline, single precision, the least significant byte first."""
+"""Samples of the record of a baseline, single precision, little-endian."""
 
 baseline_number, identification_number = (
     _table(f"{owner}_number", _owner(owner), _key("name", _Text), *_numbers("value half_width"))
@@ -207,9 +209,9 @@ usage = _table(
         "distance >= 0 AND reversals >= 0 AND breakaways >= 0 AND time_watched_ns >= 0"
     ),
 )
-"""A row for each day (since 1970, UTC) of each run of an identifier, with the packing in use.
+"""One row per day (since 1970, UTC) and run of an identifier, with the packing in use.
 
-Runs that have ended become one, "", once two days have passed."""
+Ended runs are merged into the run "" once two days have passed."""
 
 packing_renewal = _table("packing_renewal", _valve(key=True), _key("time_ns"))
 alarm_recording = _table(
@@ -226,7 +228,7 @@ told_level = _table(
     *_integers("level"),
     sa.CheckConstraint("level BETWEEN 0 AND 2"),
 )
-"""The level of each valve that its alerts have told last."""
+"""The last notified level of each valve."""
 
 alarm_event = _table(
     "alarm_event",
@@ -245,7 +247,7 @@ alarm_event = _table(
     sa.Index("alarm_event_uid", "valve_id", "uid", unique=True),
     key=["valve_id", "uid"],
 )
-"""A step of an alarm, with the whole alarm from then on: the last one of a kind is the alarm."""
+"""A step of an alarm, with the complete alarm from then on: the last row gives the alarm."""
 
 move = _table(
     "move",
@@ -257,7 +259,7 @@ move = _table(
     *_some(_REAL, "onset_force onset_position onset_rate"),
     sa.CheckConstraint("begin_ns < end_ns AND stop != start AND speed >= 0"),
 )
-"""A move in service; its forces hold for the area and the pressure reference beside them."""
+"""A move in service; its forces are valid for the area and pressure reference in the row."""
 
 evidence_reference = _table(
     "evidence_reference",
@@ -267,7 +269,7 @@ evidence_reference = _table(
     *_numbers("pressure_reference sliding_friction half_width speed"),
     sa.CheckConstraint("sliding_friction > 0 AND half_width >= 0 AND speed > 0"),
 )
-"""What the moves of a valve said first since the packing was renewed."""
+"""The first friction from the moves of a valve since the packing was renewed."""
 
 evidence_change = _table(
     "evidence_change",
@@ -278,7 +280,7 @@ evidence_change = _table(
     *_numbers("ratio low high"),
     sa.CheckConstraint("earliest_ns <= latest_ns AND ratio > 0 AND low > 0 AND low <= high"),
 )
-"""The last change of friction that the moves of a valve have shown since then."""
+"""The last change of friction from the moves of a valve since the packing was renewed."""
 
 answer = _table(
     "answer",
@@ -298,13 +300,13 @@ answer = _table(
     sa.UniqueConstraint("valve_id", "stamp"),
     key=["valve_id", "stamp"],
 )
-"""An answer of the stem to a step of its command, shares of the travel beside it."""
+"""A response of the stem to a step of its command; positions are shares of the `travel`."""
 
 mark = _table("mark", _key("name", _Text), *_texts("value"))
-"""Names of the database itself."""
+"""Properties of the database itself, such as its schema and identity."""
 
 keeper = _table("keeper", _valve(key=True), *_texts("file"))
-"""The file that keeps a valve now."""
+"""The file that presently keeps a valve."""
 
 unsent = sa.Table(
     "unsent",
@@ -317,13 +319,13 @@ unsent = sa.Table(
     sa.Index("unsent_row", "valve_id", "part", "key"),
     sqlite_autoincrement=True,
 )
-"""A row for each row that was added, changed or deleted, and not sent since. A row that changes
-again gets a new number, so that what is acknowledged meanwhile is the change before."""
+"""One row per row that was added, changed or deleted and has not been sent since. A row that
+changes again gets a new number, so that a late acknowledgement only covers the earlier change."""
 
 
 @cache
 def joined(*some: sa.Table) -> Any:
-    """Return what joins tables one after the other, by their references."""
+    """Return the join of tables, one after another, by their references."""
     found: Any = some[0]
     for table in some[1:]:
         found = found.join(table)
@@ -336,7 +338,7 @@ _TIME = {
     '\'YYYY-MM-DD"T"HH24:MI:SS"Z"\')',
 }
 _CONTENT = {"sqlite": "content", "postgresql": "md5(content)"}
-"""The settings in their index: one of PostgreSQL takes no text of any length."""
+"""The settings in their index: an index of PostgreSQL limits the length of a text."""
 
 _VIEW = """
 CREATE VIEW friction AS
@@ -389,19 +391,18 @@ _CHANGES = {
         "UPDATE baseline SET uid = time_ns || '-' || id",
     ),
 }
-"""What a version has changed beside what it has added: baselines without F_c, what a baseline
-replaced, which in an older file is the row before it, and keys of rows that are the same in each
-copy of their file."""
+"""Changes of a version other than additions: baselines without F_c; the replaced baseline, which in
+an older file is the previous row; and keys of rows that are the same in each copy of a file."""
 
 
 def bring_up_to_date(connection: Connection, version: int) -> None:
-    """Make the tables of a new history (version 0), or add to those of a version what they lack.
+    """Create the tables of a new history (version 0), or update the tables of an older version.
 
-    Within a transaction. What a version has added is what its tables lack of the declared ones;
-    beside that a few have changed what was there.
+    Runs within a transaction. It adds the declared tables and columns that are missing, and applies
+    the few other changes.
     """
     do, database = connection.exec_driver_sql, connection.dialect.name
-    if 0 < version < 3:  # there a baseline must have F_c
+    if 0 < version < 3:  # these versions require F_c in a baseline
         do("DROP VIEW friction")
         do("DROP INDEX baseline_of_valve")
         do("ALTER TABLE baseline RENAME TO former_baseline")
@@ -431,9 +432,9 @@ def _lacking(connection: Connection, table: sa.Table) -> list[sa.Column[Any]]:
 
 
 def show_as_of_now(connection: Connection) -> None:
-    """Have an older history look like one of this version, to this connection alone.
+    """Make an older history appear like one of this version, for this connection only.
 
-    What its tables lack is NULL in temporary views before them; tables that it lacks are empty.
+    Temporary views show missing columns as NULL, and missing tables as empty.
     """
     prefix = "main." if connection.dialect.name == "sqlite" else ""
     there = set(sa.inspect(connection).get_table_names())
@@ -456,7 +457,7 @@ def show_as_of_now(connection: Connection) -> None:
 
 @cache
 def _insertion(database: str, table: sa.Table, names: tuple[str, ...], is_kept: bool) -> Any:
-    """Return the statement of `put`, which is made once: a transaction is not held up by it."""
+    """Return the statement of `put`, cached so that it does not delay a transaction."""
     dialect: Any = postgresql if database == "postgresql" else sqlite
     insert, key = dialect.insert(table), key_of(table)
     changed = {name: insert.excluded[name] for name in names if name not in key}
@@ -474,8 +475,7 @@ def put(
 ) -> None:
     """Insert rows, mappings of the same columns.
 
-    Where a row is there with the same key, the new values take the place of its own; one that
-    `is_kept` stays as it is.
+    An existing row with the same key is updated; with `is_kept` it stays unchanged.
     """
     if rows:
         insert = _insertion(connection.dialect.name, table, tuple(rows[0]), is_kept)

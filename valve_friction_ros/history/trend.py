@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The history of a valve as values, how its friction drifts, and when it will cross a limit."""
+"""History of a valve as values: the drift of its friction, and the expected crossing of a limit."""
 
 import math
 from collections.abc import Sequence
@@ -38,31 +38,31 @@ from valve_friction_ros.usage import ValveUsage
 from valve_friction_ros.wording import number_and_width
 
 DAY = 86_400e9
-"""Nanoseconds of a day."""
+"""Nanoseconds per day."""
 
 MONTH = 365.25 / 12 * DAY
-"""Nanoseconds of a month: a twelfth of the Julian year."""
+"""Nanoseconds per month: a twelfth of the Julian year."""
 
 _NORMAL = 1.959964
-"""Standard errors in a half width of a large sample (95 %), so that few strokes weigh less."""
+"""Standard errors per half width in a large sample (95 %), so that few strokes weigh less."""
 
 _HORIZON = 2.0
 """Largest distance of a crossing after the last point, in spans of the points.
 
-Chosen: a line is not evidence for a longer time."""
+Chosen: the line is no evidence beyond it."""
 
 _OUTLIER = 0.001
-"""Chance to find an outlier in a history without outliers. Chosen."""
+"""Probability of finding an outlier in a history without outliers. Chosen."""
 
 _MOST_OUTLIERS = 0.1
 """Largest share of the days left out as outliers. Chosen: more would be a change, not outliers."""
 
 LEAST_ESTIMATES = 4
-"""Fewest estimates of a line: two more than it has parameters."""
+"""Fewest estimates for a line: two more than its parameters."""
 _HALVINGS = 60
 
 LIMIT_NAMES = {"warn_ratio": "worth maintenance", "error_ratio": "excess", "low_ratio": "may leak"}
-"""What the limits of the friction mean."""
+"""Meaning of the limits of the friction."""
 
 
 class ScatteredLine(NamedTuple):
@@ -73,9 +73,9 @@ class ScatteredLine(NamedTuple):
     centre : float
         Time at which level and slope are uncorrelated.
     level, slope : float
-        Its parameters.
+        Parameters of the line.
     level_error, slope_error : float
-        Their standard errors.
+        Standard errors of level and slope.
     scatter : float
         Standard deviation between estimates beyond their own errors.
     freedom : int
@@ -92,7 +92,7 @@ class ScatteredLine(NamedTuple):
 
     @property
     def quantile(self) -> float:
-        """Half width of a 95 % interval in standard errors."""
+        """Half width of a 95 % interval, in standard errors."""
         return student_quantile(0.975, self.freedom)
 
     @property
@@ -105,15 +105,16 @@ class ScatteredLine(NamedTuple):
         return self.level + self.slope * (time - self.centre)
 
     def half_width(self, time: Any) -> Any:
-        """Return half the width of the line's 95 % interval there."""
+        """Return half the width of the line's 95 % interval at a time or an array of times."""
         away = time - self.centre
         return self.quantile * np.hypot(self.level_error, self.slope_error * away)
 
     def crossing(self, level: float, level_error: float) -> tuple[float, float, float] | None:
         """Return when the line reaches a level with a standard error: time and 95 % interval.
 
-        By Fieller: the interval holds the times at which line and level do not differ at the 5 %
-        level. It is finite exactly where the slope's own interval excludes zero; None elsewhere.
+        The interval is Fieller's: it holds the times at which line and level do not differ at the
+        5 % significance level. It is finite only if the interval of the slope excludes zero; None
+        otherwise.
         """
         gap, factor = level - self.level, self.quantile**2
         a = self.slope**2 - factor * self.slope_error**2
@@ -135,7 +136,7 @@ def _misfit(
     values: NDArray[np.float64],
     errors: NDArray[np.float64],
 ) -> tuple[float, float, float, float, float]:
-    """Fit at a given scatter; centre, level, slope, total weight about the line, and χ²."""
+    """Fit at a given scatter; return centre, level, slope, weight of the slope, and χ²."""
     weights = 1.0 / (errors**2 + scatter**2)
     total = weights.sum()
     centre = float(weights @ times / total)
@@ -150,17 +151,17 @@ def _misfit(
 def fit_line(
     times: NDArray[np.float64], values: NDArray[np.float64], errors: NDArray[np.float64]
 ) -> ScatteredLine:
-    """Fit a line to estimates with errors of their own and a common scatter beside them.
+    """Fit a line to estimates with individual errors and a common additional scatter.
 
-    The scatter is the one with which χ² is as large as its degrees of freedom (Paule and Mandel),
-    zero where it is not that large without any. The standard errors are those of Knapp and
-    Hartung, scaled by √(χ²/freedom), but never down; with them belongs Student's t.
+    The scatter makes χ² equal to its degrees of freedom (Paule and Mandel); it is zero if χ² is
+    smaller without scatter. The standard errors follow Knapp and Hartung: scaled by √(χ²/freedom),
+    but never down. They go with Student's t.
 
     Parameters
     ----------
     times, values, errors : ndarray of float, shape (n,)
-        Times, not all equal; estimates; their standard errors. Errors below 1e-9 of the largest
-        value count as that much.
+        Times, not all equal; estimates; their standard errors. Errors are at least 1e-9 of the
+        largest value.
 
     Returns
     -------
@@ -170,7 +171,7 @@ def fit_line(
     Raises
     ------
     ValueError
-        If there are fewer than `LEAST_ESTIMATES`, or the times are all equal.
+        With fewer than `LEAST_ESTIMATES` estimates, or if all times are equal.
     """
     if times.size < LEAST_ESTIMATES or np.ptp(times) == 0:
         raise ValueError(f"a line needs {LEAST_ESTIMATES} estimates at several times")
@@ -200,7 +201,7 @@ def fit_line(
 
 
 class Limit(Enum):
-    """A bound of the friction, by the name of its ratio."""
+    """A limit of the friction, by the name of its ratio."""
 
     WARN = "warn_ratio"
     ERROR = "error_ratio"
@@ -209,10 +210,10 @@ class Limit(Enum):
 
 @dataclass(frozen=True)
 class Crossing:
-    """When the next limit on the way is expected to be crossed.
+    """Expected crossing of the next limit.
 
-    `level` is its friction, N; `earliest` and `latest` are the ends of the 95 % interval of
-    the expected time, ns since 1970 (UTC).
+    `level` is the friction at the limit, N; `earliest` and `latest` are the ends of the 95 %
+    interval of the expected time, ns since 1970 (UTC).
     """
 
     limit: Limit
@@ -224,12 +225,12 @@ class Crossing:
 
 @dataclass(frozen=True)
 class Trend:
-    """The drift of a friction, a line through the days, N over ns since `begin`.
+    """The drift of a friction: a line through the days, N over ns since `begin`.
 
-    `days` go into the line, `outliers` are left out. `begin` and `end` are the first and the last
-    estimate, ns since 1970 (UTC). The crossing is None without a significant drift, without a
-    baseline, or where it lies too far ahead. `of` names the friction: the sliding friction at
-    `speed`, m/s, where the baseline has one, else F_c.
+    `days` enter the line, `outliers` are left out. `begin` and `end` are the times of the first and
+    the last estimate, ns since 1970 (UTC). The crossing is None without a significant drift,
+    without a baseline, or if it is too far ahead. `of` names the friction: the sliding friction at
+    `speed`, m/s, if the baseline has one, else F_c.
     """
 
     line: ScatteredLine
@@ -243,17 +244,17 @@ class Trend:
 
     @property
     def what(self) -> str:
-        """What drifts, in words."""
+        """Name of the drifting friction, in words."""
         return str(friction_name(self.of, self.speed))
 
     @property
     def drift(self) -> float:
-        """Drift, N a month."""
+        """Drift, N per month."""
         return self.line.slope * MONTH
 
     @property
     def half_width(self) -> float:
-        """Half the width of its 95 % interval, N a month."""
+        """Half the width of its 95 % interval, N per month."""
         return self.line.slope_half_width * MONTH
 
     @property
@@ -263,7 +264,7 @@ class Trend:
 
 
 class _Days(NamedTuple):
-    """Times (ns since the first point), frictions and standard errors, a day each."""
+    """Times (ns since the first point), frictions and standard errors, one per day."""
 
     times: NDArray[np.float64]
     values: NDArray[np.float64]
@@ -271,9 +272,9 @@ class _Days(NamedTuple):
 
 
 def _days(points: Sequence[DatedNumber]) -> _Days:
-    """Combine the points of each day (UTC) to one point: their weighted mean.
+    """Combine the points of each day (UTC) into their weighted mean.
 
-    The records of one day may overlap, and share temperature and load.
+    The records of a day may overlap, and share temperature and load.
     """
     times = np.array([point.time for point in points], dtype=np.int64)
     values = np.array([point.value for point in points])
@@ -288,10 +289,10 @@ def _days(points: Sequence[DatedNumber]) -> _Days:
 
 
 def _robust_line(days: _Days) -> tuple[ScatteredLine, int]:
-    """Fit a line, and leave out outlying days.
+    """Fit a line without outlying days; return it with the number of outliers.
 
-    The day with the largest residual is compared with the prediction of the other days. It is left
-    out where chance gives such a distance in 0.1 % of histories (Bonferroni).
+    The day with the largest residual is compared with the prediction from the other days. It is an
+    outlier if chance gives such a distance in 0.1 % of histories (Bonferroni).
     """
     line, outliers = fit_line(*days), 0
     for _ in range(int(_MOST_OUTLIERS * days.times.size)):
@@ -311,7 +312,7 @@ def _robust_line(days: _Days) -> tuple[ScatteredLine, int]:
 def _crossing(
     line: ScatteredLine, begin: int, end: int, baseline: Baseline, limits: FrictionLimits
 ) -> Crossing | None:
-    """Return when the next limit is crossed, if that is not too far ahead."""
+    """Return the crossing of the next limit, unless it is too far ahead."""
     friction = friction_of(baseline, trended(baseline)) or math.nan
     half_width = (baseline.sliding or baseline).half_width
     span = end - begin
@@ -338,14 +339,14 @@ def trend_of(
 ) -> Trend | None:
     """Estimate the drift of the friction from points since the last work on the packing.
 
-    The points are those of `friction_point` with this baseline.
+    The points, in any order, are those of `friction_point` with this baseline.
 
-    The weight of a point follows from its interval and from the scatter between days, which
-    `fit_line` estimates. All points of one day count as one point. Outlying days are left out, a
-    tenth of all days at most. The baseline and the limits, as ratios to it, give the next crossing.
+    The weight of a point depends on its interval and on the scatter between days, which `fit_line`
+    estimates. All points of a day are combined into one. Outlying days are left out, at most a
+    tenth of all days. The baseline and the limits, as ratios to it, give the next crossing.
 
-    Returns None if the points, in any order, lie on fewer than four days. Raises ValueError if a
-    half width is negative or not finite.
+    Returns None if the points lie on fewer than four days. Raises ValueError if a half width is
+    negative or not finite.
     """
     if not points:
         return None
@@ -365,7 +366,7 @@ def trend_of(
 
 
 def drift_text(trend: Trend) -> str:
-    """Return the drift with its interval, and when a limit is expected to be crossed."""
+    """Return the drift with its interval, and the expected crossing of a limit, as text."""
     value, width = number_and_width(trend.drift, trend.half_width)
     text = f"{'+' if trend.drift > 0 else ''}{value} {width} N per month"
     if trend.crossing is None:
@@ -382,7 +383,7 @@ def end_of_trend(trend: Trend) -> int:
 
 
 def friction_of(baseline: Baseline | None, of: str) -> float | None:
-    """Return the friction of a baseline by its name, N; None where it has none."""
+    """Return the friction of a baseline by its name, N; None if it has none."""
     if baseline is None:
         return None
     if of == SLIDING:
@@ -392,7 +393,7 @@ def friction_of(baseline: Baseline | None, of: str) -> float | None:
 
 @dataclass(frozen=True)
 class ValveHistory:
-    """Part of one valve's history.
+    """History of one valve over a period.
 
     Attributes
     ----------
@@ -401,18 +402,18 @@ class ValveHistory:
     entries : tuple of HistoryEntry
         Its identifications, oldest first; at least one.
     set_baseline : KeptBaseline or None
-        The last baseline that was set; the trend begins with it.
+        The last baseline set; the trend begins with it.
     trend : Trend or None
         Drift of the results of the last method, against the last baseline and limits. Two methods
-        may differ by themselves, so a trend uses the results of one method.
+        may differ systematically, so a trend uses the results of one method.
     baselines : tuple of KeptBaseline
         Each change of its baseline, oldest first, without records.
     usage : ValveUsage
-        What the valve has done, at any time.
+        Usage of the valve over its whole life.
     alarms : tuple of AlarmRecording
         The recordings of its alarms, oldest first.
     response : ResponseSummary
-        Its answers to steps of its command, with the travel of the last one.
+        Its responses to steps of the command, with the travel of the last response.
     """
 
     valve: KeptValve
