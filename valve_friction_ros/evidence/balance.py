@@ -38,7 +38,7 @@ def blocks_of(moves: Moves, most: int | None = None) -> NDArray[np.intp]:
     moves : Moves
         The moves, oldest first.
     most : int, optional
-        Approximate upper limit of the number of blocks, kept by longer blocks.
+        Approximate upper limit of the number of blocks; blocks get longer to respect it.
     """
     if not len(moves):
         return np.array([], dtype=np.intp)

@@ -319,8 +319,8 @@ unsent = sa.Table(
     sa.Index("unsent_row", "valve_id", "part", "key"),
     sqlite_autoincrement=True,
 )
-"""One row per row that was added, changed or deleted and has not been sent since. A row that
-changes again gets a new number, so that a late acknowledgement only covers the earlier change."""
+"""Queue of the rows that were added, changed or deleted and not sent since. A row that changes
+again gets a new number, so that a late acknowledgement covers only the earlier change."""
 
 
 @cache

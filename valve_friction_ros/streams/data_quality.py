@@ -206,7 +206,7 @@ class DataFault:
     unusable : float
         Time since the last usable sample of the signal, s; inf if there was none.
     seconds : float
-        Lead of the stamps, s: over the clock, or of the stem's over those of the pressure.
+        Lead of the stamps over the clock, or of the stem over the pressure, s.
     reading : float
         The latest bad reading, Pa or m; nan if none is bad.
     """
