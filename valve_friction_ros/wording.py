@@ -772,6 +772,7 @@ _HEADLINES = {
     Code.STANDS_UNCERTAIN: "{alarm:headline}",
     Code.FAILED: "{error}",
     Code.NO_ESTIMATE: "no estimate",
+    Code.HELD_IN_TEST: "a test did not move the stem",
     Code.REFUSED: "the latest identification was refused",
 }
 

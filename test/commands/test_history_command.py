@@ -57,12 +57,12 @@ class TestTable:
         lines = [" ".join(line.split()) for line in output.splitlines()]
         assert "FV-101 /fv_101/identifier" in lines
         assert "LV-7 /area_2/lv_7/identifier" in lines
-        assert "2026-09-21 14:13:20 150 1 identified 1.06 OK friction normal" in lines
+        assert "2026-09-21 14:13:20 F_c 150.0 ± 1.0 identified 1.06 OK friction normal" in lines
         assert "2026-09-22 14:13:20 – refused OK too little travel: move the valve" in lines
-        assert "2026-09-21 14:13:20 80 3 weak OK friction normal: so" in lines
+        assert "2026-09-21 14:13:20 F_c 80.0 ± 3.0 weak OK friction normal: so" in lines
         (drift,) = (line for line in lines if "drifts" in line)
         assert drift.startswith("trend: coulomb friction drifts by +3.00 ± 0.")
-        assert drift.endswith("N per month, over 20 days")
+        assert drift.endswith("N per month, over 20 days with records, 2026-09-21 to 2027-02-01")
         (limit,) = (line for line in lines if "expected on" in line)
         assert limit.startswith("trend: warn_ratio (176.2 N) expected on 2027-06-1")
 
@@ -71,7 +71,9 @@ class TestTable:
         for day, friction in enumerate((150.0, 154.0, 151.0, 156.0, 153.0)):
             history.add(success(START + day * DAY, friction))
         _, output, _ = run(path=history.path)
-        assert "trend: no significant drift of coulomb friction over 5 days" in output
+        assert (
+            "no significant drift of coulomb friction over 5 days with records, 2026-09" in output
+        )
         assert "month" not in output
         (valve,) = json.loads(run("--json", path=history.path)[1])["valves"]
         assert valve["trend"]["significant"] is False

@@ -313,6 +313,18 @@ def test_the_reports_of_a_later_run_know_the_kept_baseline(plant, done, tmp_path
     assert "friction has grown" in page
 
 
+def test_a_history_of_the_name_of_the_output_is_refused(plant, capsys):
+    """The rows of friction.csv are kept in friction.sqlite."""
+    place = plant / "friction.sqlite"
+    arguments = ["--plant", str(plant / "valves.csv"), "--history", str(place)]
+    output = str(plant / "friction.csv")
+    assert run(["identify-folder", str(plant / "exports"), *arguments, "--output", output]) == 2
+    assert capsys.readouterr().err == (
+        f"valve_friction identify-folder: --history {place}: --output {output} keeps its rows in a "
+        "file of this name: give one of the two another name\n"
+    )
+
+
 class TestDashboard:
     """What the dashboard makes of the history alone."""
 

@@ -36,12 +36,7 @@ from valve_friction_ros.history import (
     read_usage,
     valve_histories,
 )
-from valve_friction_ros.identification import (
-    parameter_cells,
-    parameter_columns,
-    parameter_mapping,
-    plain,
-)
+from valve_friction_ros.identification import SLIDING, parameter_columns, plain
 from valve_friction_ros.outside_text import csv_text, printable
 from valve_friction_ros.records.files import write_whole
 from valve_friction_ros.response import ResponseSummary
@@ -306,6 +301,8 @@ def _write_csv(path: Path, histories: Sequence[ValveHistory]) -> None:
 def _told(entry: HistoryEntry) -> str:
     """Return the reason of a refusal, or the verdict without its figures."""
     found = entry.diagnosis
+    if found.statement.code is Code.HELD_IN_TEST:
+        return headline(found.statement)
     if found.statement.code is Code.QUOTED and found.state is not FrictionState.UNKNOWN:
         return entry.refusal or member_words(found.state, "state")  # of a former version
     return entry.refusal or headline(found.statement)
@@ -317,12 +314,13 @@ def _cells(row: HistoryEntry | KeptBaseline) -> tuple[str, ...]:
         level = "" if row.level is None else row.level.name
         change = f"{row.by}: {row.in_force or 'none'}; previous: {row.replaced or 'none'}"
         return ("", "", "baseline", "", level, change)
-    one, ratio = row.friction, row.diagnosis.ratio
-    cells: tuple[str, ...] = ("", "–", "", "", "refused")
+    one, ratio = row.parameters.get(SLIDING) or row.friction, row.diagnosis.ratio
+    cells: tuple[str, ...] = ("", "–", "refused")
     if one is not None:
-        cells = parameter_cells(one.name, parameter_mapping(one))
+        name = "sliding" if one.name == SLIDING else "F_c"
+        cells = (name, with_width(one.value, one.half_width), one.verdict.value)
     return (
-        *(cells[place] for place in (1, 2, 4)),
+        *cells,
         "" if ratio is None or row.refusal else f"{ratio.value:.2f}",
         row.diagnosis.level.name,
         _told(row),
@@ -336,14 +334,14 @@ def _print_table(histories: Sequence[ValveHistory]) -> None:
         table = _valve_table(
             history.valve,
             "time [UTC]",
-            "F_c [N]",
-            "± 95 %",
+            "friction",
+            "[N], ± 95 %",
             "verdict",
             "ratio",
             "level",
             "diagnosis",
         )
-        for column in (1, 2, 4):
+        for column in (2, 4):
             table.columns[column].justify = "right"
         for column in range(6):
             table.columns[column].no_wrap = True
@@ -362,9 +360,9 @@ def _print_table(histories: Sequence[ValveHistory]) -> None:
 def _trend_lines(trend: Trend | None) -> list[str]:
     if trend is None:
         return []
-    days = f"{trend.days} days"
-    if trend.outliers:
-        days += f" ({trend.outliers} left out as outliers)"
+    begin, end = (time_text(time)[:10] for time in (trend.begin, trend.end))
+    left_out = f"; {trend.outliers} left out as outliers" if trend.outliers else ""
+    days = f"{trend.days} days with records, {begin} to {end}{left_out}"
     if not trend.is_significant:
         return [f"trend: no significant drift of {trend.what} over {days}"]
     lines = [

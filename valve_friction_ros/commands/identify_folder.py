@@ -317,6 +317,16 @@ def print_alarms(rows: Iterable[Mapping[str, Cell]]) -> None:
 REFUSALS = (HistoryError,)
 
 
+def _require_own_file(options: argparse.Namespace) -> None:
+    """Refuse a history of the name under which the rows of the output are kept."""
+    history, output = options.history, options.output[0]
+    if isinstance(history, Path) and history.resolve() == database_of(output):
+        raise ValueError(
+            f"--history {history}: --output {output} keeps its rows in a file of this name: give "
+            "one of the two another name"
+        )
+
+
 def _require_sense(options: argparse.Namespace) -> None:
     """Refuse at once what would be refused of every recording."""
     if options.jobs is not None and options.scheduler is not None:
@@ -331,6 +341,7 @@ def _require_sense(options: argparse.Namespace) -> None:
             raise ValueError(f"{output}: there is no folder {output.parent}")
         if output.resolve().parent != options.output[0].resolve().parent:
             raise ValueError(f"{output}: all outputs must lie in the folder of the first")
+    _require_own_file(options)
     reading_options(options)
     anything = ValveFile(Valve(), frozen(dict.fromkeys(FIXABLE, 1.0)))
     identification_settings(options, anything)
