@@ -7,14 +7,14 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Friction of control valves, identified with the Karnopp model, with intervals.
+"""Identify the friction of control valves with the Karnopp model, with confidence intervals.
 
-Everything here works without ROS; all quantities are in SI units. The names below are loaded on
-first use. The rooms behind them, and which may import which, are drawn in ``doc/rooms.md``.
+All of this works without ROS; all quantities are in SI units. The names below are loaded on first
+use. ``doc/rooms.md`` shows the packages behind them, and which may import which.
 
 Examples
 --------
-A valve is simulated, identified, and compared with its healthy state.
+Simulate a valve, identify it, and compare it with its healthy state.
 
 >>> import numpy as np
 >>> import valve_friction_ros as vf

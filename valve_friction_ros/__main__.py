@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The command `valve_friction`, as ``python -m valve_friction_ros`` runs it."""
+"""Run the command `valve_friction` as ``python -m valve_friction_ros``."""
 
 import sys
 

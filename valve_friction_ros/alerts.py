@@ -7,10 +7,10 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Alerts: a change of a valve's level, posted to a webhook; no ROS.
+"""Alerts: changes of the level of a valve, posted to a webhook; no ROS.
 
-An `AlertSender` holds the queues of all valves of a process and the threads that send them; each
-try is bounded in time and memory, whatever the other side does.
+An `AlertSender` holds the queues of all valves of a process and the threads that send them. Each
+attempt is bounded in time and memory, whatever the receiver does.
 """
 
 import base64
@@ -44,18 +44,18 @@ def _now() -> datetime:
 
 
 class Letter(Protocol):
-    """What is posted: a change of level, or something that tells no level."""
+    """A message to post: a change of level, or one without a level."""
 
     @property
     def new_level(self) -> Level | None:
-        """The level that it tells, if any."""
+        """The level that it reports, if any."""
 
     @property
     def title(self) -> str:
-        """What it is, for whoever hears that it was not delivered."""
+        """Name of the letter in a report of its failed delivery."""
 
     def body(self) -> bytes:
-        """Return it as JSON."""
+        """Return the letter as JSON."""
 
 
 @dataclass(frozen=True)
@@ -69,19 +69,19 @@ class Alert:
     node : str
         Name of its identifier, fully qualified.
     old_level, new_level : Level
-        The level that was told last, and that of now.
+        The level reported last, and the present one.
     ne_107 : str
-        Status signal of NE 107; empty: good.
+        NE 107 status signal; empty: good.
     message : str
         The message of the diagnosis.
     friction_ratio : float or None
-        Friction over its baseline; None or nan where it is not known.
+        Friction over its baseline; None or nan where unknown.
     time : datetime
-        When the level was seen, by the system's clock, UTC.
+        Time of the change by the system clock, UTC.
     event_id : str
-        The same at each try, so that a receiver counts an event once.
+        Identical in all attempts, so that a receiver can discard duplicates.
     alarms : mapping of str to str
-        States of the alarms that are not normal, by their names.
+        States of the alarms that are not normal, by name.
     """
 
     valve: str
@@ -102,7 +102,7 @@ class Alert:
         return f"the alert {change} of {self.time:%Y-%m-%d %H:%M:%S} UTC"
 
     def body(self) -> bytes:
-        """Return the alert as JSON: the attributes by name, the time after ISO 8601."""
+        """Return the alert as JSON: the attributes by name, the time in ISO 8601."""
         ratio = self.friction_ratio
         content = {
             "event_id": self.event_id,
@@ -120,10 +120,10 @@ class Alert:
 
 
 SIGNATURE = "X-Valve-Friction-Signature"
-"""Header with the signature."""
+"""Header that carries the signature."""
 
 URL_VARIABLE = "VALVE_FRICTION_WEBHOOK_URL"
-"""Variable of the environment with the address that the token is for."""
+"""Environment variable with the address that the token belongs to."""
 _SECRET = "VALVE_FRICTION_WEBHOOK_SECRET"  # noqa: S105 - the name of a variable
 _TOKEN = "VALVE_FRICTION_WEBHOOK_TOKEN"  # noqa: S105
 
@@ -137,16 +137,16 @@ _PORTS = {"https": 443, "http": 80}
 class Webhook:
     """The address of a webhook.
 
-    As text it has neither path nor query, which hold secrets of many services.
+    Its text leaves out path and query, because many services put secrets there.
 
     Attributes
     ----------
     scheme : str
         ``https``, or ``http`` to this machine.
     host : str
-        Name or address.
+        Host name or address.
     port : int
-        Its port.
+        TCP port.
     target : str
         Path and query.
     """
@@ -158,10 +158,10 @@ class Webhook:
 
     @classmethod
     def at(cls, url: str, name: str = "webhook_url") -> "Webhook":
-        """Read the address of a webhook; `name` is what errors call it.
+        """Parse the address of a webhook; `name` names it in errors.
 
-        Raises ValueError, without the address, if it is none, is not encrypted on its way to
-        another machine, or holds a name or a password.
+        Raises ValueError if `url` is not an address, is not encrypted although it leads to another
+        machine, or holds a user name or a password. The error does not quote the address.
         """
         if not url.isascii() or not url.isprintable() or " " in url:
             raise ValueError(f"{name} contains a space or a non-ASCII character: encode it")
@@ -187,23 +187,23 @@ class Webhook:
 
     @classmethod
     def from_environment(cls, environment: Mapping[str, str] = os.environ) -> "Webhook | None":
-        """Read ``VALVE_FRICTION_WEBHOOK_URL``, if it is set; raises ValueError like `at`."""
+        """Parse ``VALVE_FRICTION_WEBHOOK_URL`` if it is set; raises ValueError like `at`."""
         url = environment.get(URL_VARIABLE, "").strip()
         return cls.at(url, URL_VARIABLE) if url else None
 
     @property
     def place(self) -> Place:
-        """Its host."""
+        """Scheme, host and port."""
         return self.scheme, self.host, self.port
 
     @property
     def is_encrypted(self) -> bool:
-        """Whether alerts go there by TLS."""
+        """Whether alerts are sent over TLS."""
         return self.scheme == "https"
 
     @property
     def is_here(self) -> bool:
-        """Whether it is on this machine."""
+        """Whether the host is this machine."""
         return is_loopback(self.host)
 
     def __str__(self) -> str:
@@ -214,14 +214,14 @@ class Webhook:
 
 @dataclass(frozen=True)
 class Secrets:
-    """What the receiver of an alert knows its sender by; never shown.
+    """Credentials that authenticate an alert to its receiver; never shown.
 
     Attributes
     ----------
     secret : str
         Key of the signature; empty: no signature.
     token : str
-        Bearer token, for the address in the environment alone; empty: none.
+        Bearer token, only for the address in the environment; empty: none.
     """
 
     secret: str = field(default="", repr=False)
@@ -231,7 +231,7 @@ class Secrets:
     def from_environment(cls, environment: Mapping[str, str] = os.environ) -> "Secrets":
         """Read ``VALVE_FRICTION_WEBHOOK_SECRET`` and ``VALVE_FRICTION_WEBHOOK_TOKEN``.
 
-        Raises ValueError, without the token, if it cannot stand in a header.
+        Raises ValueError if the token is not valid in a header; the error does not quote it.
         """
         secret, token = (environment.get(name, "").strip() for name in (_SECRET, _TOKEN))
         if not token.isascii() or (token and not token.isprintable()) or " " in token:
@@ -239,10 +239,10 @@ class Secrets:
         return cls(secret, token)
 
     def going_to(self, webhook: Webhook, environment: Mapping[str, str] = os.environ) -> "Secrets":
-        """Return what may go to a webhook: the token only to the address of the environment.
+        """Return the credentials for a webhook: the token only for the address in the environment.
 
-        Who may give a parameter is not always who may have the token. The key of the signature goes
-        nowhere.
+        A person who may set a parameter need not be entitled to the token. The key of the signature
+        is never sent.
         """
         with contextlib.suppress(ValueError):
             if webhook == Webhook.from_environment(environment):
@@ -250,7 +250,7 @@ class Secrets:
         return Secrets(self.secret)
 
     def headers(self, body: bytes, time: int) -> dict[str, str]:
-        """Return the headers that vouch for a body sent at `time`, s since 1970."""
+        """Return the headers that authenticate a body sent at `time`, s since 1970."""
         headers = {}
         if self.secret:
             headers[SIGNATURE] = signature(self.secret, body, time)
@@ -262,27 +262,27 @@ class Secrets:
 def signature(secret: str, body: bytes, time: int) -> str:
     """Sign a body that is sent at `time`, s since 1970 (UTC).
 
-    It is ``t=time,v1=digest``, the digest HMAC-SHA256 of time, a full stop and the body, in
-    hexadecimal digits. A receiver computes the same, compares in constant time, and refuses old
-    times.
+    The signature is ``t=time,v1=digest``. The digest is the HMAC-SHA256 of the time, a full stop
+    and the body, in hexadecimal. A receiver computes the same digest, compares in constant time,
+    and refuses old times.
     """
     signed = f"{time}.".encode() + body
     return f"t={time},v1={hmac.new(secret.encode(), signed, hashlib.sha256).hexdigest()}"
 
 
 _RETRIED = frozenset({408, 425, 429})
-"""Answers beside 5xx after which a later try may succeed: time-out, too early, too many."""
+"""Status codes besides 5xx after which a retry may succeed: timeout, too early, too many."""
 
 
 class DeliveryError(Exception):
-    """An alert was not delivered; the message says why, without any secret.
+    """A failed delivery; the message gives the cause and holds no secret.
 
     Attributes
     ----------
     is_final : bool
-        Whether another try would end alike, until somebody changes something.
+        Whether a retry is useless until somebody changes the configuration.
     is_answered : bool
-        Whether the host has answered; else the next letter to it would fare alike.
+        Whether the host has answered; if not, the next letter to it would fail too.
     """
 
     def __init__(self, cause: str, is_final: bool = False, is_answered: bool = True) -> None:
@@ -292,7 +292,7 @@ class DeliveryError(Exception):
 
 
 class _Connection(http.client.HTTPConnection):
-    """A connection that ends after a time, also while it is being made."""
+    """A connection with a limit on its total time, including the time to connect."""
 
     def __init__(self, webhook: Webhook, limit: float) -> None:
         proxy = None if webhook.is_here else _proxy(webhook.host)
@@ -301,7 +301,7 @@ class _Connection(http.client.HTTPConnection):
         else:
             super().__init__(proxy.hostname or "", proxy.port or 80, timeout=limit)
             self.set_tunnel(webhook.host, webhook.port, _authorization(proxy.netloc))
-        self.default_port = 443 if webhook.is_encrypted else 80  # so that Host is short
+        self.default_port = 443 if webhook.is_encrypted else 80  # keeps Host short
         self._tls_name = webhook.host if webhook.is_encrypted else None
         self._is_late = False
         self._end = threading.Timer(limit, self._cut)
@@ -320,11 +320,11 @@ class _Connection(http.client.HTTPConnection):
         with contextlib.suppress(
             OSError, AttributeError, TypeError
         ):  # not connected yet, or closed
-            # That of SSLSocket would take the encryption away from under the other thread.
+            # SSLSocket.shutdown would remove the encryption while the other thread uses it.
             socket.socket.shutdown(self.sock, socket.SHUT_RDWR)
 
     def require_time(self) -> None:
-        """Raise TimeoutError if its time is over: what it has read may be a part."""
+        """Raise TimeoutError if the time is over: the answer read may be incomplete."""
         if self._is_late:
             raise TimeoutError
 
@@ -341,7 +341,7 @@ class _Connection(http.client.HTTPConnection):
 
     @property
     def is_late(self) -> bool:
-        """Whether it was ended because its time was over."""
+        """Whether the connection was cut because its time was over."""
         return self._is_late
 
 
@@ -360,12 +360,12 @@ def _authorization(place: str) -> dict[str, str]:
 
 
 def post(webhook: Webhook, body: bytes, secrets: Secrets, limit: float = 10.0) -> None:
-    """Post a JSON body to a webhook, within `limit` seconds and the look-up of its name.
+    """Post a JSON body to a webhook within `limit` seconds, plus the time of the name look-up.
 
-    Of the answer only status line and headers are read, which ``http.client`` bounds; a redirect
-    is not followed. Certificate and host name are verified, by the authorities of the system or
-    of ``SSL_CERT_FILE``. A proxy is used where ``https_proxy`` names one, and ``no_proxy`` does not
-    exempt the host; never for this machine.
+    Only the status line and the headers of the answer are read; ``http.client`` bounds their size.
+    Redirects are not followed. Certificate and host name are verified against the authorities of
+    the system or of ``SSL_CERT_FILE``. The proxy in ``https_proxy`` is used unless ``no_proxy``
+    exempts the host, and never for this machine.
 
     Raises
     ------
@@ -421,29 +421,30 @@ _LONGEST_WAIT = 300.0
 _TRIES = 20
 
 WAITS = tuple(accumulate(repeat(1.0, _TRIES - 1), lambda wait, _: min(2 * wait, _LONGEST_WAIT)))
-"""Times, s, from each failed try to the next: 1, 2, 4 … 300; an hour in all."""
+"""Waiting times between attempts, s: 1, 2, 4 … 300; an hour in all."""
 
 _MOST_TRIES, _MOST_RETRIES = 16, 8
-"""Hosts that are tried at once, and those among them that have not answered when tried last: so
-dead hosts leave room for the others."""
+"""Largest number of hosts tried at once, and of those that did not answer the last attempt. Dead
+hosts thus leave room for the others."""
 
 _MOST_WAITING = 100
-"""Alerts of a valve that wait; then the oldest is given up."""
+"""Largest number of waiting alerts per valve; beyond it the oldest is given up."""
 
 
 class OutboxState(NamedTuple):
-    """The alerts of one valve.
+    """State of the alerts of one valve.
 
     Attributes
     ----------
     waiting, delivered, given_up : int
-        Numbers of alerts; those given up were refused, tried in vain, or had to make room.
+        Numbers of alerts. An alert is given up after a refusal, after the last attempt, or when the
+        queue is full.
     problem : str or None
-        Why the last try has failed; None if it has not.
+        Cause of the last failed attempt; None if the last attempt succeeded.
     lost : str or None
-        Which alert was given up, and why, until a later one is delivered.
+        The alert given up last and the cause, until a later alert is delivered.
     settled : Level or None
-        The level of the alert that was delivered or given up last; None without any.
+        Level of the alert delivered or given up last; None without any.
     """
 
     waiting: int
@@ -461,7 +462,7 @@ class _QueuedLetter:
 
 
 class Outbox:
-    """The alerts of one valve, sent in their order: the last one that arrives is the newest."""
+    """The alerts of one valve, sent in order: the last one to arrive is the newest."""
 
     def __init__(
         self,
@@ -480,7 +481,7 @@ class Outbox:
         self._settled: Level | None = None
 
     def address(self, webhook: Webhook | None) -> None:
-        """Send to this webhook from now on, also what waits; None: drop it, and send nothing."""
+        """Send all waiting and future letters to this webhook; None: drop them."""
         if webhook == self._webhook:
             return
         with self._changed:
@@ -492,7 +493,7 @@ class Outbox:
                 self._wake()
 
     def put(self, letter: Letter) -> None:
-        """Have a letter sent; returns at once. Without a webhook it is dropped."""
+        """Queue a letter and return at once; without a webhook it is dropped."""
         with self._changed:
             if self._webhook is None:
                 return
@@ -506,7 +507,7 @@ class Outbox:
             self._wake()
 
     def state(self) -> OutboxState:
-        """Return the numbers of alerts, and what is wrong."""
+        """Return the numbers of alerts and the present problem."""
         with self._changed:
             waiting = len(self._letters)
             counts = waiting, self._delivered, self._given_up
@@ -519,26 +520,26 @@ class Outbox:
 
     @property
     def tried(self) -> float:
-        """When it was tried last, s of the monotonic clock."""
+        """Time of the last attempt, s of the monotonic clock."""
         return self._tried
 
     def due(self) -> float | None:
-        """Return when the next try is due, s of the monotonic clock; None if nothing waits."""
+        """Return the time of the next attempt, s of the monotonic clock; None if nothing waits."""
         return self._due if self._letters else None
 
     def begin(self) -> tuple[_QueuedLetter, Webhook]:
-        """Take what is to be tried now; the caller holds the lock."""
+        """Return the letter to try now and its webhook; the caller holds the lock."""
         assert self._webhook is not None  # noqa: S101 - else nothing waits
         self._is_sending, self._tried = True, time.monotonic()
         return self._letters[0], self._webhook
 
     def skip(self, failure: DeliveryError) -> None:
-        """Count a try that would fail as another valve's has; the caller holds the lock."""
+        """Record the failure of another valve at the same host; the caller holds the lock."""
         if self._webhook is not None:
             self.end(self._letters[0], self._webhook, failure)
 
     def end(self, queued: _QueuedLetter, webhook: Webhook, failure: DeliveryError | None) -> None:
-        """Note how the try has ended; the caller holds the lock."""
+        """Record the outcome of an attempt; the caller holds the lock."""
         self._is_sending = False
         if webhook != self._webhook:
             return
@@ -559,7 +560,7 @@ class Outbox:
                 self._due = time.monotonic() + self._waits[queued.tries - 1]
 
     def is_due_at(self, place: Place, now: float) -> bool:
-        """Return whether a try at a host is due; the caller holds the lock."""
+        """Return whether an attempt at a host is due; the caller holds the lock."""
         due = self.due()
         return self.place == place and due is not None and due <= now
 
@@ -574,20 +575,20 @@ class Outbox:
 
 
 class AlertSender:
-    """Sends the alerts of many valves in threads of its own, the first of which begins with them.
+    """Sends the alerts of many valves in its own threads, started with the first alert.
 
-    One thread looks for what is due; each try is a thread, one for a host at a time and 16 in all,
-    so that no host that is slow or dead holds up the alerts to another. The threads hold up
-    neither their callers nor the end of the process; what waits then is lost.
+    One thread schedules the attempts. Each attempt runs in a thread, at most one per host and 16 in
+    all, so that a slow or dead host does not delay the alerts to the others. The threads block
+    neither their callers nor the exit of the process; alerts that still wait at exit are lost.
 
     Parameters
     ----------
     secrets : Secrets, optional
-        By default those of the environment, read at each try.
+        By default those of the environment, read at each attempt.
     waits : iterable of float
-        Times, s, from each failed try to the next; one try more is made than there are waits.
+        Waiting times between attempts, s; there is one more attempt than there are waits.
     limit : float
-        Longest time of a try, s.
+        Longest time of an attempt, s.
     """
 
     def __init__(
@@ -599,33 +600,33 @@ class AlertSender:
         self._changed = threading.Condition()
         self._outboxes: list[Outbox] = []
         self._under_way: dict[Place, bool] = {}
-        """Hosts that are tried, and whether they have not answered before."""
+        """Hosts with an attempt under way, and whether they failed to answer the last attempt."""
         self._silent: set[Place] = set()
         self._is_closed = False
         self._thread: threading.Thread | None = None
 
     def outbox(self) -> Outbox:
-        """Return a new queue, for one valve."""
+        """Return a new queue for one valve."""
         outbox = Outbox(self._changed, self._waits, self._wake)
         with self._changed:
             self._outboxes.append(outbox)
         return outbox
 
     def _wake(self) -> None:
-        """Have the thread look at the queues; the caller holds the lock."""
+        """Wake the scheduling thread; the caller holds the lock."""
         if self._thread is None and not self._is_closed:
             self._thread = threading.Thread(target=self._run, name="alerts", daemon=True)
             self._thread.start()
         self._changed.notify()
 
     def close(self) -> None:
-        """Send nothing more; returns at once, while tries may still be under way."""
+        """Start no more attempts; returns at once, though some may still be under way."""
         with self._changed:
             self._is_closed = True
             self._changed.notify()
 
     def _run(self) -> None:
-        """Begin what is due, until the end."""
+        """Start the attempts that are due, until closed."""
         with self._changed:
             while not self._is_closed:
                 now = time.monotonic()
@@ -636,7 +637,7 @@ class AlertSender:
                 self._changed.wait(min(later) - now if later else None)
 
     def _begin(self, outbox: Outbox, now: float) -> None:
-        """Try the first alert of a queue, if it is due and there is room."""
+        """Try the first alert of a queue if it is due and a thread is free."""
         place = outbox.place
         if place is None or place in self._under_way or not outbox.is_due_at(place, now):
             return
@@ -660,9 +661,9 @@ class AlertSender:
             self._changed.notify()
 
     def _fail_together(self, webhook: Webhook, failure: DeliveryError) -> None:
-        """Count the failure as a try of all that is due at a host that does not answer.
+        """Record the failure for every alert due at a host that does not answer.
 
-        So a dead host of many valves is tried once a round.
+        A dead host shared by many valves is thus tried once per round.
         """
         now = time.monotonic()
         for outbox in self._outboxes:

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Functions of the front door that combine several rooms; the package itself offers them."""
+"""Functions of the public interface that combine several packages."""
 
 from collections.abc import Mapping
 from os import PathLike
@@ -30,7 +30,7 @@ from valve_friction_ros.records.recordings import ReadingOptions, read_recording
 from valve_friction_ros.streams.samples import Samples, uniform_recording
 
 _ANY_SENSOR = Valve()
-"""The default valve: its sensors have no range, its stem has no stops."""
+"""The default valve, without sensor ranges and without stops."""
 
 
 def read_recording(
@@ -46,27 +46,27 @@ def read_recording(
     source : path, or mapping of str to array_like
         CSV file (may be gzipped) or bag (MCAP or SQLite3, folder or file); or a pandas frame or
         a mapping with the columns ``time_s``, ``position_m`` and ``pressure_pa``, or ``force_n``
-        for a machine without a diaphragm (`Valve()`). Dates may stand in ``time_s``, or be the
-        index of a frame in its place; without a zone they are UTC.
+        for a machine without a diaphragm (`Valve()`). ``time_s`` may hold dates; the index of a
+        frame may hold them instead. Dates without a zone are UTC.
     valve : Valve, optional
-        Range of the pressure sensor, and the travel for positions in percent. With a diaphragm
-        it converts ``force_n`` of a file into the pressure that exerts this force.
+        Gives the range of the pressure sensor, and the travel for positions in percent. A diaphragm
+        converts ``force_n`` of a file into the pressure that exerts this force.
     name : str, optional
-        Valve of a bag, by its namespace; needed for a bag of several valves.
+        Namespace of the valve in a bag; required for a bag of several valves.
     options : ReadingOptions, optional
-        Columns, units and layout of a CSV file, topics of a bag, the part to read.
+        Columns, units and layout of a CSV file, topics of a bag, and the part to read.
 
     Returns
     -------
     Recording
-        Pressure, or force, and stem position on one uniform time grid.
+        Pressure or force, and stem position, on a common uniform time grid.
 
     Raises
     ------
     ValueError
-        If the source cannot be read, a column is missing, or the bag holds no such valve.
+        If the source cannot be read, a column is missing, or the bag does not contain the valve.
     RefusalError
-        If the samples do not make a record. A gap makes one: see `Recording.gap`.
+        If the samples do not form a record. A gap is allowed: see `Recording.gap`.
 
     Examples
     --------
@@ -94,7 +94,7 @@ def read_recording(
 
 
 def _column(columns: Mapping[str, Any], name: str) -> NDArray[np.float64]:
-    """Return a column as numbers; raise ValueError with its name if that fails."""
+    """Return a column as finite numbers; raises ValueError with its name if that fails."""
     if name not in columns:
         known = ", ".join(map(str, columns))
         raise ValueError(f"there is no column {name!r} among {known}: rename a column")
@@ -106,7 +106,7 @@ def _column(columns: Mapping[str, Any], name: str) -> NDArray[np.float64]:
 
 
 def _stamps_of_index(columns: Mapping[str, Any]) -> NDArray[np.int64] | None:
-    """Return times that are dates, of a column or of a frame's index, ns; None of anything else."""
+    """Return the dates in ``time_s`` or in a frame's index as ns since 1970; None without dates."""
     given: Any = columns["time_s"] if "time_s" in columns else getattr(columns, "index", None)
     dtype = getattr(given, "dtype", None)
     if isinstance(dtype, np.dtype) and dtype.kind == "M":
@@ -139,20 +139,20 @@ def simulate(
     sample_period: float,
     start: StemState | None = None,
 ) -> Trajectory:
-    """Simulate the stem under a sampled drive, equations (1) and (2).
+    """Simulate the stem for a sampled drive, equations (1) and (2).
 
     Parameters
     ----------
     valve : Valve
         Geometry and travel stops.
     parameters : KarnoppParameters or Result
-        The model, or a result with one.
+        The model, or a result that contains a model.
     drive : ndarray of float, shape (n,)
         Actuator pressure, Pa, or force, N.
     sample_period : float
         Time between two samples, s.
     start : StemState, optional
-        State at the first sample; by default at rest where the forces balance.
+        State at the first sample; by default at rest in the balance of forces.
 
     Returns
     -------
@@ -185,21 +185,21 @@ def simulate(
 def compare(
     result: Result, baseline: Baseline | Result, limits: FrictionLimits | None = None
 ) -> Diagnosis:
-    """Compare an identified friction with that of the healthy valve.
+    """Compare identified friction with the friction of the healthy valve.
 
     Parameters
     ----------
     result : Result
-        The friction now.
+        The present friction.
     baseline : Baseline or Result
-        The friction of the healthy valve: a number with its half width, or its identification.
+        Friction of the healthy valve: a number with its half width, or an identification.
     limits : FrictionLimits, optional
-        Ratios from which friction counts as grown, excessive or collapsed.
+        Ratios that define grown, excessive and collapsed friction.
 
     Returns
     -------
     Diagnosis
-        Level, NE 107 status signal, a sentence, and the ratio with its interval.
+        Level, NE 107 status signal, message, and ratio with its interval.
 
     Raises
     ------

@@ -7,10 +7,10 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Public names of a package that are loaded on their first use.
+"""Lazy loading of the public names of a package.
 
-A package that re-exports what its modules hold would otherwise load all of them with the first:
-``valve_friction identify --help`` needs the names of the settings, and not a compiler.
+A package that re-exports names from its modules would otherwise load all modules with the first
+name. ``valve_friction identify --help`` needs the names of the settings, but no compiler.
 """
 
 import ast
@@ -22,7 +22,7 @@ from typing import Any
 
 
 def _homes(source: Path) -> dict[str, str]:
-    """Return the module of each name that a package imports for the type checker alone."""
+    """Return the module of each name that a package imports only for the type checker."""
     tree = ast.parse(source.read_bytes())
     return {
         alias.name: str(statement.module)
@@ -37,20 +37,20 @@ def _homes(source: Path) -> dict[str, str]:
 def names_on_demand(package: str) -> Callable[[str], Any]:
     """Return the ``__getattr__`` (PEP 562) of a package.
 
-    Its names are those that its ``__init__.py`` imports in ``if TYPE_CHECKING:``, so there is one
-    list of them, which the type checker reads too: ``import a as a`` says that a is public. They
-    are its ``__all__`` where it has none. None may be called like a module of the package:
-    whoever imported that module first would get it in place of the name.
+    The public names are those that ``__init__.py`` imports in ``if TYPE_CHECKING:``. The type
+    checker reads the same list: ``import a as a`` marks a as public. The list also serves as
+    ``__all__`` where the package defines none. No name may equal that of a module of the package:
+    if the module were imported first, it would hide the name.
 
     Parameters
     ----------
     package : str
-        Its ``__name__``.
+        ``__name__`` of the package.
 
     Returns
     -------
     callable
-        Takes a name and loads it; raises AttributeError for one that is not in the list.
+        Loads a name; raises AttributeError for a name that is not in the list.
     """
     homes: dict[str, str] = {}
 

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Text from outside: made harmless where it is shown; names that nobody knows, and the nearest."""
+"""Text from outside: escaping for terminals and CSV, and suggestions for unknown names."""
 
 import csv
 import difflib
@@ -17,11 +17,11 @@ from typing import Any
 
 _LONGEST = 10_000
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")
-"""What a spreadsheet takes for the begin of a formula."""
+"""Characters with which a formula of a spreadsheet begins."""
 
 
 def printable(text: str, most: int = _LONGEST) -> str:
-    """Return text whose control characters, which a terminal would obey, are written out."""
+    """Return text with its control characters escaped, so that a terminal does not obey them."""
     short = text if len(text) <= most else f"{text[:most]}…"
     if short.isprintable():
         return short
@@ -33,12 +33,12 @@ def _is_formula(text: str) -> bool:
 
 
 def harmless(cell: Any) -> Any:
-    """Return the value of a CSV cell; a text that looks like a formula gets an apostrophe first."""
+    """Return the value of a CSV cell, with an apostrophe before text that looks like a formula."""
     return f"'{cell}" if isinstance(cell, str) and _is_formula(cell) else cell
 
 
 def csv_text(header: Sequence[str], rows: Iterable[Mapping[str, Any]]) -> str:
-    """Return rows as CSV, their cells harmless; one that a row does not have is empty."""
+    """Return rows as CSV with harmless cells; missing values become empty cells."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(header)
@@ -47,24 +47,24 @@ def csv_text(header: Sequence[str], rows: Iterable[Mapping[str, Any]]) -> str:
 
 
 def as_read(cell: str) -> str:
-    """Return the text that `harmless` was given."""
+    """Undo `harmless`."""
     return cell[1:] if cell.startswith("'") and _is_formula(cell) else cell
 
 
 _MOST_NAMED = 12
-"""Names in a message. Chosen: it stays readable."""
+"""Largest number of names in a message. Chosen: the message stays readable."""
 
 _RESEMBLES = 0.8
-"""Likeness (difflib) of a misspelled name. Chosen: two letters of ten may differ."""
+"""Least similarity (difflib) of a misspelled name. Chosen: two letters of ten may differ."""
 
 
 def resembling(name: str, known: Iterable[str]) -> list[str]:
-    """Return the known name that a misspelled one resembles, if there is one."""
+    """Return a list with the known name that a misspelled name resembles, or an empty list."""
     return difflib.get_close_matches(name, known, n=1, cutoff=_RESEMBLES)
 
 
 def nearest(name: object, known: Iterable[str]) -> str:
-    """Return the end of a message about an unknown name: the nearest known one, or all of few."""
+    """Return the end of a message about an unknown name: the nearest known name, or a list."""
     names = list(known)
     text = str(name)[:100]
     close = difflib.get_close_matches(text, names, n=1)

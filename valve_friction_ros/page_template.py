@@ -7,13 +7,13 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Templates of HTML pages, in which all text from outside is escaped."""
+"""Templates of HTML pages; all text from outside is escaped."""
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 
 def page_environment(package: str) -> Environment:
-    """Return the environment of the templates that lie beside the modules of a package."""
+    """Return the environment of the templates in the folder of a package."""
     return Environment(
         loader=PackageLoader(package, "."),
         autoescape=True,

@@ -7,12 +7,12 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The settings of the package, each declared once: its default, range, unit and description.
+"""The settings of the package, each declared once: default, range, unit and description.
 
-A declaration, with its words below it, makes the parameter of a node with its descriptor, the line
-of ``--help`` and of the reference, the key of a valve file, and, where it names one, the option of
-the commands that identify. A default that a value type has is taken from there when it is asked
-for: this module imports nothing slow and no ROS.
+A declaration and the text below it define the parameter of a node with its descriptor, the line in
+``--help`` and in the reference, the key of a valve file and, where given, the option of the
+commands that identify. A default that belongs to a value type is looked up on first use, so this
+module imports nothing slow and no ROS.
 """
 
 import ast
@@ -48,16 +48,16 @@ ALARM_KINDS = (
     "data_quality",
     "positioner",
 )
-"""Names of a valve's alarms; those of `health.AlarmKind`."""
+"""Names of the alarms of a valve, as in `health.AlarmKind`."""
 
 PACKINGS = ("ptfe", "graphite")
-"""Classes of packing; those of `health.survey.PACKING_LIMITS`."""
+"""Packing classes, as in `health.survey.PACKING_LIMITS`."""
 
 _UNIT = re.compile(r" \[([^\]]+)\]")
 
 
 class _Of(NamedTuple):
-    """A default by its place below the package, such as a field of a value type."""
+    """A default given by its location in the package, such as a field of a value type."""
 
     module: str
     name: str
@@ -73,26 +73,26 @@ class Setting:
     Attributes
     ----------
     initial : bool, int, float, str, list of str, or where to find it
-        Default, which fixes the type. None: a number that is unset until somebody states it; a nan
-        is taken for unset. The whole number 0 as a default stands for "not given".
+        Default; it fixes the type. None: a number that is unset until a value is given; nan also
+        means unset. A default of the integer 0 means "not given".
     limits : tuple of float, optional
-        Lowest and highest value. A number that may be nan or infinite has none, because ROS counts
-        nan as outside any range; the value types check it all the same.
+        Lowest and highest value. Absent for a number that may be nan or infinite, because ROS
+        treats nan as outside any range; the value types still check it.
     read_only : bool
-        It can only be given at start. Whoever reaches the ROS graph can change the others, so all
-        addresses, folders and their room are among these.
+        Whether it can only be given at start. Anyone on the ROS graph can change the others, so all
+        addresses, folders and limits of disk space are read-only.
     choices : tuple of str
-        Values that a text may have; any, if empty.
+        Permitted values of a text; empty: any.
     option : str
-        Option of the commands that identify; none, if empty.
+        Option of the commands that identify; empty: none.
     is_assumed : bool
-        The default is only assumed while nobody states a value, and the results say so.
+        Whether the default is only assumed until a value is given; the results report this.
     spell : callable
-        Returns the present spelling of a text.
+        Converts a text to its present spelling.
     name : str
         Name of the parameter, and key of a valve file.
     description : str
-        What it means, with its unit in brackets, [-] for none.
+        Meaning, with the unit in brackets; [-] for none.
     """
 
     initial: bool | float | str | list[str] | _Of | None
@@ -111,12 +111,12 @@ class Setting:
 
     @property
     def default(self) -> Any:
-        """Value where none is given; None: unset."""
+        """Value if none is given; None: unset."""
         return None if self.is_assumed else self._value
 
     @property
     def assumed(self) -> Any:
-        """What is taken while the value is unset; None: nothing."""
+        """Value assumed while it is unset; None: nothing."""
         return self._value if self.is_assumed else None
 
     @property
@@ -135,13 +135,13 @@ class Setting:
         return (self.option or self.name).lstrip("-").replace("-", "_")
 
     def is_given(self, value: Any) -> bool:
-        """Return False for what stands for "not given"."""
+        """Return whether `value` differs from the values that mean "not given"."""
         is_zero = type(value) is int and value == 0 == self.default
         return not (value is None or value != value or is_zero)  # noqa: PLR0124 - nan
 
 
 def _words() -> dict[tuple[str, str], str]:
-    """Return what stands below each declaration of this file, by its class and name."""
+    """Return the text below each declaration of this file, by class and name."""
     groups = ast.parse(Path(__file__).read_bytes()).body
     return {
         (group.name, ast.unparse(field.targets[0])): " ".join(ast.literal_eval(words.value).split())
@@ -156,7 +156,7 @@ _WORDS = _words()
 
 
 def _declared(group: type, **changes: Any) -> tuple[Setting, ...]:
-    """Return the settings that a class declares, with what is common to them."""
+    """Return the settings that a class declares, with the changes common to them."""
     return tuple(
         replace(one, name=name, description=_WORDS[group.__name__, name].rstrip("."), **changes)
         for name, one in vars(group).items()
@@ -470,10 +470,10 @@ class _Dashboard:
 
 
 VALVE = _declared(_Valve, is_assumed=True)
-"""Description of a watched valve; a simulated one is that of the paper by default."""
+"""Description of a monitored valve; a simulated valve is by default that of the paper."""
 
 KARNOPP = _declared(_Karnopp)
-"""The friction and the spring of a simulated valve."""
+"""Friction and spring of a simulated valve."""
 
 IDENTIFICATION = (
     *_declared(_Identification),
@@ -498,10 +498,10 @@ IDENTIFICATION = (
         for name in FIXABLE
     ),
 )
-"""What nodes and commands identify with: what `identification_from` takes."""
+"""Settings of an identification by nodes and commands, for `identification_from`."""
 
 SURVEY = _declared(_Survey)
-"""Limits of a first survey, of nodes, commands and valve files: what `survey_from` takes."""
+"""Limits of a first survey in nodes, commands and valve files, for `survey_from`."""
 
 _BY_DATA_SHEET = tuple(
     replace(
@@ -523,7 +523,7 @@ _IDENTIFIER = (
 )
 
 HOST = _declared(_Identifiers)
-"""What the node `identifiers` has beside the parameters of its identifiers."""
+"""Parameters of the node `identifiers` itself."""
 
 NODES: Mapping[str, tuple[Setting, ...]] = MappingProxyType(
     {
@@ -535,31 +535,31 @@ NODES: Mapping[str, tuple[Setting, ...]] = MappingProxyType(
         "dashboard": (*_declared(_Dashboard, read_only=True), *_MANAGED),
     }
 )
-"""The parameters of each node; `identifiers` has those of its identifiers too."""
+"""Parameters of each node; `identifiers` also has those of its identifiers."""
 
 COLUMNS = "columns"
-"""The section of a valve file about tables of samples."""
+"""Section of a valve file that describes tables of samples."""
 
 VALVE_KEYS = tuple(
     dict.fromkeys((*(one.name for one in VALVE), *FIXABLE, *(one.name for one in _IDENTIFIER)))
 )
-"""Keys of a valve file beside `COLUMNS`; commands have no use for those of the identifier only."""
+"""Keys of a valve file besides `COLUMNS`; commands ignore those that only the identifier uses."""
 
 NODE_NAMES = frozenset(one.name for settings in NODES.values() for one in settings)
-"""Parameters that a node of this package has."""
+"""Names of the parameters of all nodes of this package."""
 
 _OF_ROS = ("use_sim_time", "start_type_description_service")
 
 
 def is_known(name: str) -> bool:
-    """Return whether a node of this package, or rclpy for it, reads a parameter."""
+    """Return whether a node of this package, or rclpy on its behalf, reads a parameter."""
     return (
         name in NODE_NAMES or name in _OF_ROS or name.startswith((f"{COLUMNS}.", "qos_overrides"))
     )
 
 
 def survey_from(given: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what `SurveyLimits.of_packing` takes of the settings of `SURVEY` that are given."""
+    """Return the given settings of `SURVEY` as arguments of `SurveyLimits.of_packing`."""
     return {
         one.name.removeprefix("survey_"): given[one.name]
         for one in SURVEY
@@ -568,10 +568,10 @@ def survey_from(given: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def identification_from(given: Mapping[str, Any], **others: Any) -> IdentificationSettings:
-    """Build the settings of an identification from those of `IDENTIFICATION` that are given.
+    """Build the settings of an identification from the given settings of `IDENTIFICATION`.
 
-    `others` are fields that are no settings of their own, as `stated`. Raises ValueError if they
-    are impossible, or do not go together.
+    `others` are fields without a setting, such as `stated`. Raises ValueError if values are
+    impossible or incompatible.
     """
     fixed = {
         name.removeprefix("fixed."): value

@@ -7,11 +7,11 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""One signal: its derivatives, its noise, its smoothing, its runs and holds; no ROS.
+"""Derivatives, noise, smoothing, runs and holds of one signal; no ROS.
 
 Inequalities decide whether the simulated stem rests or slides, so the effect of pressure noise does
 not average to zero. A plain smoother rounds the corners where the commanded pressure changes, which
-is where the stem reverses. Therefore the corners of a drive are found first, and the signal is
+is where the stem reverses. The corners of a drive are therefore found first, and the signal is
 smoothed between them.
 
 """
@@ -30,7 +30,7 @@ from valve_friction_ros.model.recording import Recording, StampedSignal
 
 
 class Derivatives(NamedTuple):
-    """Velocity and acceleration at every sample that has a full window around it.
+    """Velocity and acceleration at every sample with a full window around it.
 
     Attributes
     ----------
@@ -54,9 +54,9 @@ class Derivatives(NamedTuple):
 def savgol_weights(
     window: int, order: int, degree: int = 0, sample_period: float = 1.0
 ) -> NDArray[np.float64]:
-    """Return the weights of a Savitzky–Golay filter, to convolve a signal with.
+    """Return the weights of a Savitzky–Golay filter, ready for convolution.
 
-    They are those of `scipy.signal.savgol_coeffs`, whose import takes half a second.
+    They equal those of `scipy.signal.savgol_coeffs`, whose import takes half a second.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def savgol_weights(
     order : int
         Order of the polynomials.
     degree : int
-        Degree of the derivative in the middle of the window; 0 smoothes.
+        Order of the derivative in the middle of the window; 0 smooths.
     sample_period : float
         Time between two samples, s.
 
@@ -74,7 +74,7 @@ def savgol_weights(
     ndarray of float, shape (window,)
         The weights, the last sample's first.
     """
-    # Over places from −1 to 1 the powers stay apart, however long the window is.
+    # On the interval from −1 to 1 the powers stay well-conditioned for any window length.
     powers = np.vander(np.linspace(-1.0, 1.0, window), order + 1, increasing=True)
     size = 0.5 * (window - 1) * sample_period
     weights = np.linalg.pinv(powers)[degree] * (math.factorial(degree) / size**degree)
@@ -86,9 +86,9 @@ def differentiate(
 ) -> Derivatives:
     """Differentiate sampled positions by a least-squares polynomial in a sliding window.
 
-    Equation (20) and the two that follow it, taken at the middle of each window: a
-    Savitzky–Golay filter. The first and last (d − 1)/2 samples have no full window; they get no
-    derivative, because that of a one-sided window is less accurate.
+    Equation (20) and the two that follow it, evaluated at the middle of each window: a
+    Savitzky–Golay filter. The first and last (d − 1)/2 samples have no full window. They get no
+    derivative, because a one-sided window is less accurate.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ def differentiate(
     Raises
     ------
     ValueError
-        If there are fewer samples than the window is long.
+        If there are fewer samples than `window`.
 
     References
     ----------
@@ -133,7 +133,7 @@ def differentiate(
 
 _KEPT = 0.9
 """Share of the second differences that is used. Chosen: jerks take far less than a tenth of a
-record; each further tenth left out widens the scatter of the estimate."""
+record, and each further tenth left out widens the scatter of the estimate."""
 
 _KEPT_MEAN = 0.657347
 """Mean magnitude of the smallest 90 % of standard normal numbers: 2·(φ(0) − φ(1.645))/0.9."""
@@ -142,9 +142,9 @@ _KEPT_MEAN = 0.657347
 def position_noise(position: NDArray[np.float64]) -> float:
     """Estimate the standard deviation of white noise on the stem position, m.
 
-    Estimated from second differences, which the motion of the stem hardly changes: those of white
-    noise of deviation s have the deviation √6·s. The largest tenth is left out, where the stem may
-    have been jerked. A mean is used because a median takes values of converter codes only.
+    The estimate uses second differences, which the motion of the stem hardly changes: for white
+    noise of deviation s their deviation is √6·s. The largest tenth is left out, because the stem
+    may have jerked there. A mean is used because a median can only take values of converter codes.
     """
     if position.size < 3:
         return 0.0
@@ -155,9 +155,9 @@ def position_noise(position: NDArray[np.float64]) -> float:
 
 
 def quantisation_step(signal: NDArray[np.float64]) -> float:
-    """Estimate the step of a converter: the smallest difference of two values of `signal`.
+    """Estimate the step of a converter: the smallest difference between two values of `signal`.
 
-    Zero where more than half of the samples differ, as in a signal without quantisation.
+    Zero where more than half of the samples are distinct, as in a signal without quantisation.
     """
     values = np.unique(signal)
     if values.size < 2 or values.size > 0.5 * signal.size:
@@ -167,11 +167,11 @@ def quantisation_step(signal: NDArray[np.float64]) -> float:
 
 
 def sensor_noise(signal: NDArray[np.float64]) -> float:
-    """Estimate the deviation of a sensor's noise, in the unit of `signal`, rounding included.
+    """Estimate the deviation of a sensor's noise including rounding, in the unit of `signal`.
 
     Second differences (`position_noise`) miss the rounding error of a converter where the signal
     hardly changes, and the error is not white where the signal drifts slowly. Therefore 1/√12 of
-    the step is added in squares.
+    the step is added in quadrature.
     """
     return math.hypot(position_noise(signal), quantisation_step(signal) / math.sqrt(12.0))
 
@@ -183,20 +183,21 @@ def velocity_noise(noise: float, sample_period: float, window: int, order: int) 
 
 
 _stamped_noises: WeakKeyDictionary[StampedSignal, float] = WeakKeyDictionary()
-"""Noise of the signals of an identification, several parts of which need it."""
+"""Cache of the noise of each signal, which several parts of an identification need."""
 
 
 def stamped_noise(signal: StampedSignal) -> float:
-    """Estimate the deviation of a sensor's white noise, rounding included, in the signal's unit.
+    """Estimate the deviation of a sensor's white noise including rounding, in the signal's unit.
 
-    Each sample is compared with the straight line between its neighbours. With the share a of the
-    pause that lies behind it, the difference of white noise of deviation s has the variance
+    Each sample is compared with the straight line between its neighbours. If the share a of the
+    time between the neighbours follows the sample, the difference of white noise of deviation s has
+    the variance
 
         s²·(1 + a² + (1 − a)²) ,
 
-    whatever the pauses are. The largest tenth is left out, where the stem may have been jerked.
-    1/√12 of a converter's step is added in squares: where the signal hardly changes, the
-    differences miss the rounding.
+    for any spacing. The largest tenth is left out, because the stem may have jerked there. 1/√12 of
+    a converter's step is added in quadrature: where the signal hardly changes, the differences miss
+    the rounding.
     """
     if (known := _stamped_noises.get(signal)) is not None:
         return known
@@ -215,41 +216,41 @@ _ORDER = 3
 """Order of the smoothing polynomials: the paper's n for derivatives."""
 
 _CORNER_GATE = 8.0
-"""Standard deviations of a jump of the slope that make a corner.
+"""Jump of the slope that makes a corner, in standard deviations.
 
-Chosen: 1 of 10¹⁵ windows by chance, so that a false corner never splits a smooth signal."""
+Chosen: exceeded by chance in 1 of 10¹⁵ windows, so a false corner never splits a smooth signal."""
 
 _CORNER_SHARPNESS = 3.0
-"""Ratio of a corner's jump to the jumps one window away. Chosen: at a corner of a ramp they are
-zero, on a parabola equal; three separates both in noise."""
+"""Least ratio of a corner's jump to the jumps one window away. Chosen: those are zero at the corner
+of a ramp and equal on a parabola; three separates both in noise."""
 
 _LEAST_DETERMINANT = 1e-9
 """Determinant of two unit vectors below which they are parallel up to rounding. One sample
 after a corner gives 1e-15, two give 0.05 and more."""
 
 _CORNER_SCALES = (1, 2, 4)
-"""Windows over which corners are searched, over the shortest. Chosen: a slope's noise falls with
-the 1.5th power of the window, so the longest finds corners eight times smaller."""
+"""Windows of the search for corners, over the shortest. Chosen: the noise of a slope falls with the
+1.5th power of the window, so the longest finds corners eight times smaller."""
 
 _LONG_WINDOW = 512
-"""Weights from which a Fourier transform is quicker than their products."""
+"""Number of weights from which a Fourier transform is faster than direct convolution."""
 
 _RESIDUAL_GATE = 4.0
-"""Standard deviations above the expected variance beyond which a residual holds signal: 3 of
-100,000 windows by chance."""
+"""Standard deviations above the expected variance beyond which a residual contains signal: exceeded
+by chance in 3 of 100,000 windows."""
 
 
 def _window_slopes(signal: NDArray[np.float64], window: int) -> NDArray[np.float64]:
-    """Slope per sample of the straight line through each window, by its first sample."""
+    """Return the slope per sample of the straight line through each window, by first sample."""
     place = np.arange(window) - (window - 1) / 2
     weights = (place / (place @ place))[::-1]
     return np.asarray(np.convolve(signal, weights, "valid"), dtype=np.float64)
 
 
 def _peaks(signal: NDArray[np.float64], least: float, distance: int) -> NDArray[np.intp]:
-    """Find local maxima of at least `least`, the highest of those nearer than `distance`.
+    """Find local maxima of at least `least`; of those nearer than `distance`, keep the highest.
 
-    A plateau has its maximum in its middle; none is at an end of the signal.
+    The maximum of a plateau is its middle. The ends of the signal are no maxima.
     """
     begins = np.flatnonzero(np.diff(signal, prepend=np.nan))
     levels = signal[begins]
@@ -266,7 +267,7 @@ def _peaks(signal: NDArray[np.float64], least: float, distance: int) -> NDArray[
 
 
 def _sharp_jumps(signal: NDArray[np.float64], noise: float, window: int) -> NDArray[np.intp]:
-    """Find where the slopes over `window` samples on both sides differ, unlike those nearby."""
+    """Find where the slopes over `window` samples on both sides differ far more than nearby."""
     if signal.size < 4 * window:
         return np.empty(0, dtype=np.intp)
     place = np.arange(window) - (window - 1) / 2
@@ -282,9 +283,9 @@ def _sharp_jumps(signal: NDArray[np.float64], noise: float, window: int) -> NDAr
 def _localised(signal: NDArray[np.float64], corner: int, window: int) -> int:
     """Move a corner, within half a window, to where the signal bends most.
 
-    The model of the signal is a parabola, plus a second parabola that begins at zero at the corner.
-    The corner with the smallest residual is returned. Where too few samples follow a candidate to
-    tell its parabola from a line, it is left out.
+    The signal is modelled as a parabola plus a second parabola that starts from zero at the corner.
+    The candidate with the smallest residual is returned. A candidate is skipped if too few samples
+    follow it to distinguish its parabola from a line.
     """
     first, last = max(corner - window, 0), min(corner + window, signal.size)
     place = np.linspace(-1.0, 1.0, last - first)
@@ -314,8 +315,9 @@ def find_corners(signal: NDArray[np.float64], noise: float, window: int) -> NDAr
     noise : float
         Standard deviation of its white noise.
     window : int
-        Samples on either side over which the slopes are compared, at least 3. Corners below the
-        noise at this scale are searched over twice and four times as many samples.
+        Samples on either side over which the slopes are compared, at least 3. The search is
+        repeated over twice and four times as many samples, for corners below the noise at shorter
+        scales.
 
     Returns
     -------
@@ -351,16 +353,16 @@ def smooth_between(
 
 @cache
 def _cubics(window: int) -> NDArray[np.float64]:
-    """Orthonormal cubics over a window, shape (window, 4)."""
+    """Return orthonormal cubics over a window, shape (window, 4)."""
     place = np.linspace(-1.0, 1.0, window)
     return np.asarray(np.linalg.qr(np.vander(place, _ORDER + 1))[0], dtype=np.float64)
 
 
 def smoothing_leverage(size: int, corners: NDArray[np.intp], window: int) -> NDArray[np.float64]:
-    """Return the share of the noise's variance that `smooth_between` leaves at each sample.
+    """Return the share of the noise variance that `smooth_between` leaves at each sample.
 
-    It is 9/4 over the window inside a stretch, and rises to 16 over the window at its ends, where
-    the cubic is held from one side only.
+    It is 9/4 over the window inside a stretch, and rises to 16 over the window at the ends, where
+    the cubic is supported from one side only.
     """
     shares = np.ones(size)
     edges = (0, *corners.tolist(), size)
@@ -377,7 +379,7 @@ def smoothing_leverage(size: int, corners: NDArray[np.intp], window: int) -> NDA
 
 
 def _convolved(signal: NDArray[np.float64], weights: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Convolve a signal with fewer weights, where they overlap in full."""
+    """Convolve a signal with a shorter array of weights, where both overlap fully."""
     if weights.size < _LONG_WINDOW:
         return np.asarray(np.convolve(signal, weights, "valid"), dtype=np.float64)
     length = 1 << (signal.size - 1).bit_length()  # wrapped products come before the full overlap
@@ -388,9 +390,9 @@ def _convolved(signal: NDArray[np.float64], weights: NDArray[np.float64]) -> NDA
 def _local_cubics(stretch: NDArray[np.float64], window: int) -> NDArray[np.float64]:
     """Apply a Savitzky–Golay filter; the cubics of the first and the last window give the ends.
 
-    The result is that of `scipy.signal.savgol_filter` with ``mode="interp"``. That function repeats
-    the fit of the cubics for each part, and takes n·window products; the Fourier transform needs
-    fewer where the window is long.
+    The result equals that of `scipy.signal.savgol_filter` with ``mode="interp"``. That function
+    refits the cubics for each part and takes n·window products. The Fourier transform needs fewer
+    for long windows.
     """
     cubics, half = _cubics(window), window // 2
     level = stretch[0]
@@ -408,10 +410,10 @@ def longest_faithful_window(
 
     The residual of a smoother on white noise, averaged over blocks of a quarter window, has a
     variance that follows from the weights. A smoother that removes signal leaves a larger variance
-    of the block averages. Windows that grow by half are tried, the longest first and then by
-    bisection: a window within a faithful one is faithful too. `corners` are the samples where the
-    slope jumps (`find_corners`), `noise` is the standard deviation of the white noise; without
-    noise the window is 1.
+    of the block averages. The candidates grow by half from window to window. The search tries the
+    longest first and then bisects, because a window shorter than a faithful one is faithful too.
+    `corners` are the samples where the slope jumps (`find_corners`), and `noise` is the standard
+    deviation of the white noise. Without noise the window is 1.
     """
     if noise == 0:
         return 1
@@ -446,13 +448,13 @@ _CORNER_TIME = 0.04
 _CORNER_SAMPLES = 8
 """Least time, s, and samples over which the slopes on both sides of a corner are compared.
 
-Chosen: short against the 1.3 s lag of the bench's converter; a slope over 8 samples has 0.15 of
-the noise per sample. An absolute time."""
+Chosen: short compared with the 1.3 s lag of the bench's converter; a slope over 8 samples has 0.15
+of the noise per sample. An absolute time."""
 
 _LONGEST_SMOOTHING = 0.5
 """Longest smoothing window of the drive, s. Chosen: it bounds the time of the search.
 
-`longest_faithful_window` decides before that where the signal bends. An absolute time."""
+Where the signal bends, `longest_faithful_window` stops earlier. An absolute time."""
 
 
 class DriveSmoothing(NamedTuple):
@@ -461,9 +463,9 @@ class DriveSmoothing(NamedTuple):
     Attributes
     ----------
     corners : ndarray of int
-        Samples at which the slope of the drive jumps; it is smoothed between them.
+        Samples at which the slope of the drive jumps; smoothing takes place between them.
     window : int
-        Window to smooth over, samples; 1 for a noiseless drive.
+        Smoothing window, samples; 1 for a noiseless drive.
     """
 
     corners: NDArray[np.intp]
@@ -478,7 +480,7 @@ def smoothing_of(signal: NDArray[np.float64], noise: float, period: float) -> Dr
 
 
 _LONGEST_DERIVATIVE_WINDOW = 1.0
-"""Longest derivative window, s, and a twentieth of the record at most.
+"""Longest derivative window, s; a twentieth of the record is a further limit.
 
 Chosen: it bounds the time of the search. An absolute time."""
 
@@ -498,22 +500,22 @@ class MeasuredRecord(Recording):
 
     @cached_property
     def position_noise(self) -> float:
-        """Standard deviation of the noise of the position, m, rounding included."""
+        """Standard deviation of the noise of the position including rounding, m."""
         return math.hypot(self.white_noise, quantisation_step(self.position) / math.sqrt(12.0))
 
     @cached_property
     def drive_noise(self) -> float:
-        """Standard deviation of the noise of the drive, Pa or N, rounding included."""
+        """Standard deviation of the noise of the drive including rounding, Pa or N."""
         return sensor_noise(self.drive)
 
     @cached_property
     def drive_smoothing(self) -> DriveSmoothing:
-        """Corners of the drive, and the window to smooth it over between them."""
+        """Corners of the drive, and the smoothing window between them."""
         return smoothing_of(self.drive, self.drive_noise, self.sample_period)
 
     @cached_property
     def smoothed_drive(self) -> NDArray[np.float64]:
-        """The drive, smoothed between its corners as far as its noise requires, shape (n,)."""
+        """The drive smoothed between its corners as far as its noise requires, shape (n,)."""
         corners, window = self.drive_smoothing
         return self.drive if window == 1 else smooth_between(self.drive, corners, window)
 
@@ -523,12 +525,12 @@ class MeasuredRecord(Recording):
         return longest_faithful_window(self.position, _NO_CORNERS, self.position_noise, longest)
 
     def fitting_window(self, order: int) -> int:
-        """Choose the derivative window from noise and bandwidth of the stem position.
+        """Choose the derivative window from the noise and bandwidth of the stem position.
 
         Parameters
         ----------
         order : int
-            Polynomial order of the derivatives; the window holds at least order + 2 samples.
+            Polynomial order of the derivatives; the window has at least order + 2 samples.
 
         Returns
         -------
@@ -542,7 +544,7 @@ class MeasuredRecord(Recording):
         return {}
 
     def derivatives(self, window: int, order: int) -> Derivatives:
-        """Differentiate the position (`differentiate`) over `window` samples by order `order`."""
+        """Differentiate the position (`differentiate`) with a given window and order."""
         known = self._differentiated
         if (window, order) not in known:
             known[window, order] = differentiate(self.position, self.sample_period, window, order)
@@ -564,7 +566,7 @@ def measured(recording: Recording) -> MeasuredRecord:
 
 
 def runs_of(active: NDArray[np.bool_]) -> list[list[int]]:
-    """First and one-past-last index of each run of True."""
+    """Return the first and the one-past-last index of each run of True."""
     edges: list[list[int]] = (
         np.flatnonzero(np.diff(active, prepend=False, append=False)).reshape(-1, 2).tolist()
     )
@@ -572,7 +574,7 @@ def runs_of(active: NDArray[np.bool_]) -> list[list[int]]:
 
 
 def all_around(which: NDArray[np.bool_], reach: int) -> NDArray[np.bool_]:
-    """Return where all samples up to `reach` before and after are set."""
+    """Return where all samples within `reach` before and after are True."""
     sums = np.concatenate([[0], np.cumsum(np.pad(which, reach, mode="edge"))])
     width = 2 * reach + 1
     return np.asarray(sums[width:] - sums[:-width] == width)
@@ -581,21 +583,21 @@ def all_around(which: NDArray[np.bool_], reach: int) -> NDArray[np.bool_]:
 _FEWEST_CHANGES = 20
 _SHORTER_HOLD = 0.6
 _FEW_SHORTER = 0.02
-"""A signal is held if it changes this often, and fewer than the last share of its runs of equal
-values are shorter than the first share of the usual run: noise changes a signal at any time."""
+"""A held signal has at least `_FEWEST_CHANGES` changes, and fewer than `_FEW_SHORTER` of its runs
+of equal values are shorter than `_SHORTER_HOLD` of the usual run: noise changes at any time."""
 
 _LARGER_STEP = 1.5
 _MANY_LARGER = 0.2
-"""And if more than this share of its changes are larger than the least change by this factor: the
-values of a converter that follows a slow stem change by one step each, at any time."""
+"""More than `_MANY_LARGER` of its changes exceed the least change by the factor `_LARGER_STEP`: a
+converter that follows a slow stem changes by single steps, at any time."""
 
 
 def without_repeats(signal: StampedSignal) -> StampedSignal:
-    """Keep the fresh values of a held signal, at the stamps at which they first appeared.
+    """Keep only the fresh values of a held signal, at the stamps of their first appearance.
 
-    A repeated value adds nothing, and is wrong at the time at which it is repeated. A signal that
-    is not held is returned unchanged. Where a source sent the same value again, the sample in its
-    place is kept.
+    A repeated value adds nothing and is wrong at the time of its repetition. A signal that is not
+    held is returned unchanged. If the source sent the same value again, the sample at that time is
+    kept.
     """
     steps = np.diff(signal.value)
     changes = np.flatnonzero(steps) + 1
@@ -622,17 +624,17 @@ def without_repeats(signal: StampedSignal) -> StampedSignal:
 _IRREGULAR_GAP = 3.0
 _REGULAR_SHARE = 0.8
 _EVEN_STEP = 0.5
-"""A signal is sent on change if its longest pause is more than so many usual pauses, fewer than
-this share of its pauses are as short as the shortest, and its steps are hardly ever smaller than
-this share of the usual step. Lost samples leave the other pauses alike; a sensor that samples at
-its own rate has steps of any size."""
+"""Conditions of a signal that is sent on change. Its longest pause exceeds `_IRREGULAR_GAP` usual
+pauses, at most `_REGULAR_SHARE` of its pauses are about as short as the shortest, and its steps are
+hardly ever smaller than `_EVEN_STEP` of the usual step. Lost samples leave the other pauses equal;
+a sensor that samples at its own rate has steps of any size."""
 
 _JUMP = 2.0
-"""Dead bands beyond which a change after a pause was a jump: a slower change is sent on its way."""
+"""Dead bands beyond which a change after a pause is a jump: slower ones are sent as they occur."""
 
 
 def as_sent_on_change(signal: StampedSignal) -> StampedSignal:
-    """Keep the last value of a signal that is sent on change until just before it jumps.
+    """Hold each value of a signal that is sent on change until just before the next jump.
 
     A source with a dead band is silent while its value hardly changes. A straight line over such a
     pause would move a stem that sticks while the force on it grows. Other signals are returned

@@ -9,9 +9,9 @@
 
 """Usage of a valve: distance, reversals, breakaways, time at each travel; no ROS.
 
-`UsageCounter` counts it from the stem position as it comes, with a dead band that the noise and the
-resolution of the sensor may raise; `ValveUsage` keeps it day by day and since the packing was
-renewed; `UsageLimits` say when the packing is due.
+`UsageCounter` derives it from the stream of stem positions, with a dead band that noise and
+resolution of the sensor may raise. `ValveUsage` keeps it by day and since the packing was renewed.
+`UsageLimits` define when the packing is due for replacement.
 """
 
 import itertools
@@ -37,7 +37,7 @@ BINS = 20
 
 @dataclass(frozen=True)
 class Usage:
-    """What a valve has done while it was watched; two of them add up.
+    """Usage of a valve while it was monitored; usages can be added.
 
     Attributes
     ----------
@@ -45,17 +45,17 @@ class Usage:
         Travelled distance, m: the sum of the strokes between reversals, each longer than the
         counting dead band.
     reversals : int
-        Changes of direction that were followed by a stroke beyond the counting dead band.
+        Changes of direction followed by a stroke beyond the counting dead band.
     breakaways : int
-        Starts of the stem after a rest of a whole second of the stamps (`Breakaways`).
+        Starts of the stem after a rest of one full second of the stamps (`Breakaways`).
     histogram : tuple of int
-        Time at each 5 % of the travel, ns, from position 0 upwards; the first and the last hold
-        what lies beyond the stops, too.
+        Time at each 5 % of the travel, ns, from position 0 upwards; the first and the last bin
+        include positions beyond the stops.
 
     Raises
     ------
     ValueError
-        If a number is negative or not finite, or the histogram has not `BINS` bins.
+        If a number is negative or not finite, or the histogram does not have `BINS` bins.
     """
 
     distance: float = 0.0
@@ -71,7 +71,7 @@ class Usage:
             raise ValueError(f"the histogram must have {BINS} times of at least 0 ns")
 
     def __add__(self, other: "Usage") -> "Usage":
-        """Add up two usages."""
+        """Return the sum of two usages."""
         return Usage(
             self.distance + other.distance,
             self.reversals + other.reversals,
@@ -81,11 +81,11 @@ class Usage:
 
     @property
     def time_watched(self) -> int:
-        """Time in which the valve was watched, ns: the sum of the histogram."""
+        """Time for which the valve was monitored, ns: the sum of the histogram."""
         return sum(self.histogram)
 
     def strokes(self, travel: float) -> float:
-        """Return the distance in full strokes of a `travel`, m; nan for a machine without stops."""
+        """Return the distance in full strokes over `travel`, m; nan for a machine without stops."""
         return self.distance / travel if math.isfinite(travel) else math.nan
 
     def time_near_seat(self, seat_is_at_travel: bool = False) -> int:
@@ -114,19 +114,19 @@ def total(usages: Iterable[Usage]) -> Usage:
 class StrokeCounter:
     """Adds up the strokes between reversals.
 
-    The stem has reversed once it has come back by more than the dead band from the farthest point
-    of its stroke. That point is the turning point, and the distance is the sum of the strokes from
-    turning point to turning point, up to the farthest point of the stroke under way. So a signal
-    that stays within the dead band counts nothing, and what is counted never shrinks. This is the
-    travel accumulator and the cycle counter of digital valve controllers, except that a stroke
-    counts whole, however far beyond the dead band it ends.
+    The stem has reversed once it has returned by more than the dead band from the farthest point of
+    its stroke. That point is the turning point. The distance is the sum of the strokes between
+    turning points, up to the farthest point of the present stroke. A signal that stays within the
+    dead band thus adds nothing, and the sums never decrease. Digital valve controllers have the
+    same travel accumulator and cycle counter, but here a stroke is added in full length once it
+    exceeds the dead band.
 
     Attributes
     ----------
     distance : float
         Distance, m.
     reversals : int
-        Reversals.
+        Number of reversals.
     """
 
     def __init__(self) -> None:
@@ -135,15 +135,15 @@ class StrokeCounter:
         self._direction = 0
         self._low, self._high = math.inf, -math.inf
         self._farthest = 0.0
-        """Farthest point of the stroke under way, counted in its direction, m."""
+        """Farthest point of the present stroke, measured in its direction, m."""
 
     def begin_anew(self) -> None:
-        """Forget the position of the stem; the next one counts no distance."""
+        """Forget the position of the stem; the next position adds no distance."""
         self._direction = 0
         self._low, self._high = math.inf, -math.inf
 
     def add(self, position: NDArray[np.float64], band: float) -> None:
-        """Count positions, m, shape (n,), finite, with a dead band, m."""
+        """Process finite positions, m, shape (n,), with a dead band, m."""
         begin = 0
         while begin < position.size:
             follow = self._follow if self._direction else self._wait
@@ -177,7 +177,7 @@ class StrokeCounter:
 
 
 def _first_or_last(is_so: NDArray[np.bool_]) -> int:
-    """Return the first place where it is so, or else the last place."""
+    """Return the index of the first True, or the last index if there is none."""
     place = int(is_so.argmax())
     return place if is_so[place] else is_so.size - 1
 
@@ -188,15 +188,15 @@ _SECOND = 1_000_000_000
 class Breakaways:
     """Counts how often a resting stem starts.
 
-    Time is cut into whole seconds of the stamps. The stem rests in a second in which it stays
-    within the dead band, and moves in one in which it does not; a breakaway is a second of motion
-    after a second of rest. So stick-slip counts each slip beyond the dead band, and a stem that
-    creeps by less than the dead band in a second counts nothing.
+    Time is divided into whole seconds of the stamps. The stem rests in a second if it stays within
+    the dead band; otherwise it moves. A breakaway is a second of motion after a second of rest.
+    During stick-slip each slip beyond the dead band is thus a breakaway, while a stem that creeps
+    by less than the dead band per second has none.
 
     Attributes
     ----------
     count : int
-        Breakaways.
+        Number of breakaways.
     """
 
     def __init__(self) -> None:
@@ -204,7 +204,7 @@ class Breakaways:
         self.begin_anew()
 
     def begin_anew(self) -> None:
-        """Forget what the stem did; no breakaway counts before it has rested again."""
+        """Forget the motion of the stem; it must rest again before the next breakaway."""
         self._rested = False
         self._is_whole = False
         self._second: int | None = None
@@ -212,7 +212,7 @@ class Breakaways:
         self._band = 0.0
 
     def add(self, stamps: NDArray[np.int64], position: NDArray[np.float64], band: float) -> None:
-        """Count positions, m, at increasing stamps, ns, shape (n,) each; dead band in m."""
+        """Process positions, m, at increasing stamps, ns, shape (n,) each; dead band in m."""
         self._band = band
         seconds = stamps // _SECOND
         begins = np.flatnonzero(np.diff(seconds, prepend=seconds[0] - 1))
@@ -229,7 +229,7 @@ class Breakaways:
             self._last = last
 
     def _end_second(self) -> None:
-        """Judge the second that has passed; the next one begins where the stem is."""
+        """Evaluate the past second; the next second starts at the present position."""
         if self._second is None:
             self._low, self._high = np.inf, -np.inf
             return
@@ -242,29 +242,29 @@ class Breakaways:
 
 _DIFFERENCE_ORDER = 4
 _GAIN = math.sqrt(math.comb(2 * _DIFFERENCE_ORDER, _DIFFERENCE_ORDER))
-"""Deviation of the fourth differences of white noise of deviation 1: √70."""
+"""Standard deviation of the fourth differences of white noise of deviation 1: √70."""
 _MOST_SEEN = 16
-"""Blocks whose noise is remembered. Chosen: the stem rests in some of them."""
+"""Number of blocks whose noise is kept. Chosen: the stem rests in some of them."""
 _BAND_NOISE = 14.0
 """Dead band over the deviation of the noise.
 
-Noise counts when two samples of one rest lie a dead band apart. Of 10⁹ samples, some ten days at
-1 kHz, the farthest lie 12 deviations apart; the estimate may be a tenth too small."""
+Noise adds distance if two samples of one rest lie a dead band apart. Among 10⁹ samples, about ten
+days at 1 kHz, the extremes lie 12 deviations apart; the estimate may be a tenth too small."""
 _BAND_STEPS = 2.0
-"""Dead band over the step of a converter: it may flicker between three codes."""
+"""Dead band over the step of a converter, which may flicker between three codes."""
 _MANY_CODES = 8
-"""Different values in a block that show a converter's codes. Chosen: fewer may be places at which
-a noiseless stem has rested."""
+"""Distinct values in a block from which they are codes of a converter. Chosen: fewer may be the
+resting positions of a noiseless stem."""
 
 
 class SensorBand:
-    """Follows the noise and the resolution of a sensor, block by block.
+    """Tracks the noise and the resolution of a sensor, block by block.
 
-    The noise of a block is read from fourth differences, in which the motion of a stem all but
-    vanishes, by their median, which jumps do not change. Where a stem moves fast against the
-    sampling rate some motion is left, so the lower quartile of the last blocks counts. The step of
-    a converter is the smallest difference in blocks of many codes, or of values that come and go
-    from one sample to the next.
+    The noise of a block is the median of its fourth differences: the motion of a stem almost
+    vanishes in them, and jumps do not change the median. Some motion is left if the stem moves fast
+    for the sampling rate, so the lower quartile of the last blocks is used. The step of a converter
+    is the smallest difference in blocks with many codes, or with values that flicker from sample to
+    sample.
     """
 
     def __init__(self) -> None:
@@ -277,7 +277,7 @@ class SensorBand:
         return self._band
 
     def add(self, position: NDArray[np.float64]) -> None:
-        """Take a block of positions, m, shape (n,)."""
+        """Process a block of positions, m, shape (n,)."""
         if position.size <= _DIFFERENCE_ORDER:
             return
         self._follow_step(position)
@@ -298,32 +298,32 @@ class SensorBand:
 
 
 DEFAULT_BAND = 0.01
-"""Counting dead band as a share of the travel, the usual one of digital valve controllers."""
+"""Counting dead band as a share of the travel, as usual in digital valve controllers."""
 
 _BLOCK, _LARGEST_BLOCK = 256, 1024
-"""Fewest and most samples that are counted together; between them a second is enough. Chosen: a
-block costs as much as its 250 samples."""
+"""Least and largest number of samples in a block; between them a block ends after one second.
+Chosen: a block costs as much as its 250 samples."""
 _LARGEST_GAP = 10
-"""Sampling periods above which a pause is a gap, as in a record."""
+"""Number of sampling periods beyond which a pause is a gap, as in a record."""
 _LONG_GAP = 1_000_000_000
-"""Gap, ns, after which it is not known whether the stem has rested. Chosen."""
+"""Gap, ns, beyond which it is unknown whether the stem has rested. Chosen."""
 _FARTHEST = 0.5
-"""Distance beyond a stop, in travels, from which a reading is no position of the stem. Chosen."""
+"""Distance beyond a stop, over the travel, beyond which a reading is not a position. Chosen."""
 
 
 class UsageCounter:
-    """Adds up the usage of one valve day by day (UTC, by the stamps).
+    """Adds up the usage of one valve by day (UTC, from the stamps).
 
-    Samples are counted in blocks of 256 to 1024, whatever blocks they come in, so that how they
-    come changes nothing. Within a block:
+    Samples are processed in blocks of 256 to 1024, however they arrive, so that the result does not
+    depend on their arrival. Within a block:
 
-    - Readings that are not finite, or lie more than half a travel beyond the stops, and repeated
-      stamps are left out.
-    - The pause after a sample counts as time at its position. A pause of more than ten sampling
-      periods is a gap: it counts no time. The stem has moved at least from the one end of
-      the gap to the other, so that distance counts.
-    - A stamp that goes back means that the clock has jumped: what the stem did meanwhile is not
-      known, and counting begins anew with the next sample.
+    - Readings that are not finite or lie more than half a travel beyond the stops, and repeated
+      stamps, are left out.
+    - The pause after a sample is time at its position. A pause of more than ten sampling periods is
+      a gap and adds no time. It does add distance: the stem has moved at least from one end of the
+      gap to the other.
+    - A stamp that goes back means that the clock has jumped. The motion in between is unknown, and
+      counting starts afresh with the next sample.
 
     Parameters
     ----------
@@ -347,22 +347,22 @@ class UsageCounter:
         self._days: dict[int, Usage] = {}
 
     def drain(self) -> dict[int, Usage]:
-        """Return what was counted since the last call, by days since 1970 (UTC)."""
+        """Return and clear the usage since the last call, by days since 1970 (UTC)."""
         days, self._days = self._days, {}
         return days
 
     @property
     def band(self) -> float:
-        """The counting dead band in force, m."""
+        """The present counting dead band, m."""
         return max(self._share * self._travel, self._sensor.band)
 
     @property
     def is_raised(self) -> bool:
-        """Whether the sensor's noise or resolution demands more than the given dead band."""
+        """Whether noise or resolution of the sensor demands more than the given dead band."""
         return self._sensor.band > self._share * self._travel
 
     def add(self, samples: Samples) -> None:
-        """Take the next samples of the stem position, m."""
+        """Process the next samples of the stem position, m."""
         if samples.stamps.size == 0:
             return
         self._waiting.append(samples)
@@ -385,16 +385,16 @@ class UsageCounter:
         self._count = stamps.size
 
     def flush(self) -> None:
-        """Count what waits for a whole block, at the end of a stream."""
+        """Process an incomplete block at the end of a stream."""
         if self._count:
             stamps, position = Samples.joined(*self._waiting)
             self._count_block(stamps, position)
         self._waiting, self._count = [], 0
 
     def _count_block(self, stamps: NDArray[np.int64], position: NDArray[np.float64]) -> None:
-        """Count samples; the dead band is that of all samples up to the last one of the block."""
+        """Process a block; its dead band follows from all samples up to the end of the block."""
         beyond = _FARTHEST * self._travel
-        good = (position >= -beyond) & (position <= self._travel + beyond)  # nan is not
+        good = (position >= -beyond) & (position <= self._travel + beyond)  # rejects nan
         stamps, position = stamps[good], position[good]
         good = np.diff(stamps, prepend=np.iinfo(np.int64).min // 2) != 0
         if self._last is not None and good.size:
@@ -421,7 +421,7 @@ class UsageCounter:
             if pauses[begin] < 0:
                 self._strokes.begin_anew()
             part = slice(begin, end)
-            # Sums of whole nanoseconds below 2**53 are exact in floats.
+            # Floats are exact for sums of whole nanoseconds below 2**53.
             histogram = np.bincount(bins[part], times[part], BINS).astype(np.int64)
             self._count_part(int(days[begin]), stamps[part], position[part], histogram)
 
@@ -432,7 +432,7 @@ class UsageCounter:
         position: NDArray[np.float64],
         histogram: NDArray[np.int64],
     ) -> None:
-        """Count samples of one day without a jump of the clock or a long gap between them."""
+        """Process samples of one day that contain no clock jump and no long gap."""
         strokes, breakaways, band = self._strokes, self._breakaways, self.band
         before = strokes.distance, strokes.reversals, breakaways.count
         strokes.add(position, band)
@@ -447,10 +447,11 @@ class UsageCounter:
 
 
 _PACE_DAYS = 14
-"""Last days with samples from which the pace is taken. Chosen: two weeks of work and rest."""
+"""Number of recent days with samples that determine the pace. Chosen: two working weeks with their
+weekends."""
 _KEPT_DAYS = 31
 _LEAST_WATCHED = DAY
-"""Least time watched, ns, for a pace. Chosen: a day holds what recurs in a day."""
+"""Least monitored time, ns, for a pace. Chosen: a day includes everything that recurs daily."""
 
 
 class UsedDay(NamedTuple):
@@ -461,9 +462,9 @@ class UsedDay(NamedTuple):
     day : int
         Days since 1970 (UTC), by the stamps.
     renewal : int
-        When the packing in use was renewed, ns since 1970 (UTC); 0: not known.
+        When the packing then in use was renewed, ns since 1970 (UTC); 0: unknown.
     usage : Usage
-        What the valve did.
+        Usage on that day.
     """
 
     day: int
@@ -472,7 +473,7 @@ class UsedDay(NamedTuple):
 
 
 class Pace(NamedTuple):
-    """Usage of a day of watching: distance, m, and reversals."""
+    """Usage per monitored day: distance, m, and reversals."""
 
     distance: float
     reversals: float
@@ -485,9 +486,9 @@ class ValveUsage:
     Attributes
     ----------
     days : tuple of UsedDay
-        Oldest packing first, then by days; each pair of renewal and day once.
+        Sorted by packing, oldest first, then by day; each pair of renewal and day occurs once.
     renewal : int
-        When the packing was renewed last, ns since 1970 (UTC); 0: not known.
+        When the packing was last renewed, ns since 1970 (UTC); 0: unknown.
     """
 
     days: tuple[UsedDay, ...] = ()
@@ -495,7 +496,7 @@ class ValveUsage:
 
     @classmethod
     def of(cls, days: Iterable[UsedDay], renewal: int = 0) -> "ValveUsage":
-        """Bring days into their order, and add up those that occur more than once."""
+        """Sort days, and add up those that occur more than once."""
         found: dict[tuple[int, int], Usage] = {}
         for one in days:
             key = one.renewal, one.day
@@ -505,18 +506,18 @@ class ValveUsage:
 
     @property
     def total(self) -> Usage:
-        """Usage in all."""
+        """Total usage."""
         return total(one.usage for one in self.days)
 
     @property
     def since_renewal(self) -> Usage:
-        """Usage since the packing was renewed last; in all, where no renewal is known."""
+        """Usage since the packing was last renewed; total usage if no renewal is known."""
         return total(one.usage for one in self._of_this_packing())
 
     def pace(self) -> Pace | None:
-        """Return the usage of a day of watching, over the last days of this packing.
+        """Return the usage per monitored day, over the last days of this packing.
 
-        None before the valve has been watched for a day.
+        None until the valve has been monitored for a day.
         """
         recent = total(one.usage for one in self._of_this_packing()[-_PACE_DAYS:])
         if recent.time_watched < _LEAST_WATCHED:
@@ -525,7 +526,7 @@ class ValveUsage:
         return Pace(recent.distance * share, recent.reversals * share)
 
     def condensed(self) -> "ValveUsage":
-        """Return the same usage with at most 31 single days, of this packing; the rest as sums."""
+        """Return the same usage with at most 31 single days of this packing, the rest summed."""
         recent = set(self._of_this_packing()[-_KEPT_DAYS:])
         sums: dict[int, UsedDay] = {}
         for one in self.days:
@@ -553,10 +554,10 @@ class ValveUsage:
 
 
 LEAD = 30 * DAY
-"""Time before the expected date from which a limit warns, ns. Chosen: a packing can be ordered and
-its renewal planned."""
+"""Lead time of the warning before the expected date, ns. Chosen: it allows time to order a packing
+and plan its renewal."""
 _DATE_DOUBT = 2 * DAY
-"""Time, ns, by which a date may have receded by the end of the day on which it warned."""
+"""Time, ns, by which the expected date may recede until the end of the day of the warning."""
 _END_OF_TIME = 2**63 - 1
 
 
@@ -582,22 +583,22 @@ class UsageLimits:
 
 
 class LimitState(NamedTuple):
-    """How far a packing is from a limit.
+    """Usage of a packing compared with a limit.
 
     Attributes
     ----------
     name : str
-        Name of the limit's parameter.
+        Parameter name of the limit.
     used, limit : float
         Usage since the packing was renewed, and the limit: m, or reversals.
     expected : int or None
-        When the limit is expected at the pace of the last days, if the valve is watched all the
-        time, ns since 1970 (UTC); None where it is reached, the pace is not known, or no date of
+        Expected date of the limit at the pace of the last days under continuous monitoring, ns
+        since 1970 (UTC). None if the limit is reached, the pace is unknown, or the date is beyond
         the calendar.
     now : int
         Time of this state, ns.
     has_warned : bool
-        Whether it has warned before: while a valve rests, the expected date recedes.
+        Whether the limit has already warned: while a valve rests, the expected date recedes.
     """
 
     name: str
@@ -614,16 +615,16 @@ class LimitState(NamedTuple):
 
     @property
     def warns(self) -> bool:
-        """Whether the limit is reached, expected within `LEAD`, or was so before."""
+        """Whether the limit is reached, expected within `LEAD`, or has already warned."""
         return self.is_reached or self.has_warned or self.is_expected_within(LEAD)
 
     def is_expected_within(self, lead: int) -> bool:
-        """Return whether it is expected within a time, ns."""
+        """Return whether the limit is expected within `lead`, ns."""
         return self.expected is not None and self.expected - self.now <= lead
 
     @property
     def statement(self) -> Statement:
-        """The figures, the date, and what to do."""
+        """The figures, the expected date and the remedy."""
         state = said(Code.LIMIT_NEAR)
         if self.is_reached:
             state = said(Code.LIMIT_REACHED)
@@ -642,7 +643,7 @@ class LimitState(NamedTuple):
 def limit_states(
     used: Usage, pace: Pace | None, limits: UsageLimits, now: int
 ) -> tuple[LimitState, ...]:
-    """Compare the usage since the renewal with each limit that is given, at the time `now`, ns."""
+    """Compare the usage since the renewal with each given limit, at the time `now`, ns."""
     found = []
     for name, value, limit, daily in (
         ("travel_limit", used.distance, limits.travel, pace and pace.distance),
@@ -657,9 +658,9 @@ def limit_states(
 
 
 def warned_limits(usage: ValveUsage, limits: UsageLimits) -> set[str]:
-    """Return the names of the limits that have warned on a day of the packing in use.
+    """Return the names of the limits that have warned on a day of the present packing.
 
-    A day tells its usage as a whole, so a limit that was to warn within two days counts too.
+    Usage is known per whole day only, so limits due to warn within two days are included.
     """
     days = [one for one in usage.days if one.renewal == usage.renewal]
     found: set[str] = set()

@@ -7,10 +7,10 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The sentences of the product: what is found is a `Code` and its numbers, and is worded here.
+"""The sentences of the product: a finding is a `Code` with its numbers, worded here.
 
-Nothing decides by a sentence, stores one as state or looks into one: a `Statement` is compared,
-kept and restored by its code and its facts; `sentence` writes it for topics, pages, reports, logs.
+No code decides by a sentence, stores it as state or parses it. A `Statement` is compared, stored
+and restored by its code and facts. `sentence` words it for topics, pages, reports and logs.
 """
 
 import math
@@ -25,10 +25,10 @@ from valve_friction_ros.model.drive import Drive
 
 
 class Code(Enum):
-    """What a statement says."""
+    """Meaning of a statement."""
 
     QUOTED = auto()
-    """Words from outside, or of a former version, as they are."""
+    """Text from outside or from a former version, verbatim."""
     # The diagnosis of the friction
     COMPARED = auto()
     COMPARED_AGAIN = auto()
@@ -41,7 +41,7 @@ class Code(Enum):
     NOT_COMPARED_SPEED = auto()
     NOT_COMPARED_LACKING = auto()
     WAS_COMPARED = auto()
-    # What stands around it
+    # Qualifications of a diagnosis
     MISFIT = auto()
     DOUBTED = auto()
     SCALED = auto()
@@ -75,7 +75,7 @@ class Code(Enum):
     AREA_AND_SCALE = auto()
     SCALE = auto()
     POSITION_SCALE = auto()
-    # The evidence of the moves
+    # Evidence from the moves in service
     UNTIL_BEFORE = auto()
     BASELINE_WITHOUT_SLIDING = auto()
     BASELINE_AT_OTHER_SPEED = auto()
@@ -126,7 +126,7 @@ class Code(Enum):
     POSITION_OUT_OF_RANGE = auto()
     NONE_USABLE = auto()
     LAST_USABLE = auto()
-    # The answer to the command
+    # Response to the command
     STEPS_IGNORED = auto()
     ANSWER_LATE = auto()
     ANSWER_SLOW = auto()
@@ -143,27 +143,27 @@ class Code(Enum):
 
 @dataclass(frozen=True)
 class Statement:
-    """What is said: a code, and the facts that it needs.
+    """A code with the facts that its sentence needs.
 
     Attributes
     ----------
     code : Code
-        What is said.
+        Meaning of the statement.
     facts : mapping of str to object
-        Numbers in SI units, times in ns since 1970 (UTC), names of parameters and of members of
-        enums, other statements, and tuples of these. A fact that is unknown is None.
+        Numbers in SI units, times in ns since 1970 (UTC), names of parameters and of enum members,
+        other statements, and tuples of these. An unknown fact is None.
     """
 
     code: Code
     facts: Mapping[str, Any]
 
     def to_dict(self) -> dict[str, Any]:
-        """Return it as a mapping of plain values, which `from_dict` reads."""
+        """Return the statement as a mapping of plain values, the inverse of `from_dict`."""
         return {"code": self.code.name, **{name: _plain(one) for name, one in self.facts.items()}}
 
     @classmethod
     def from_dict(cls, kept: Mapping[str, Any]) -> "Statement":
-        """Return the statement that was kept; raises ValueError for an unknown code."""
+        """Restore a stored statement; raises ValueError for an unknown code."""
         try:
             code = Code[kept["code"]]
         except KeyError as unknown:
@@ -180,7 +180,7 @@ class Statement:
         return told
 
     def __hash__(self) -> int:
-        """Return one of code and facts, as statements that are counted need it."""
+        """Return a hash of code and facts, so that statements can be counted."""
         return hash((self.code, frozenset(self.facts.items())))
 
     def __str__(self) -> str:
@@ -194,7 +194,7 @@ def said(code: Code, **facts: Any) -> Statement:
 
 
 def quoted(text: str) -> Statement:
-    """Return words from outside, or of a former version, as a statement."""
+    """Return text from outside, or from a former version, as a statement."""
     return said(Code.QUOTED, text=text)
 
 
@@ -227,21 +227,21 @@ def finding_advice(statement: Statement) -> str:
 
 
 def headline(statement: Statement) -> str:
-    """Write what a statement finds without its figures, for a cell of a table."""
+    """Write a statement without its figures, for a cell of a table."""
     template = _HEADLINES.get(statement.code) or _SENTENCES[statement.code]
     return _WRITER.vformat(template, (), statement.facts)
 
 
-# Numbers and times as people read them
+# Numbers and times for people
 
 
 def two_digits(value: float) -> str:
-    """Write a size with two significant digits, from 100 on as a whole number; no exponent."""
+    """Write a number with two significant digits, or as an integer from 100 on; no exponent."""
     return f"{value:.2g}" if abs(value) < 99.5 else f"{value:.0f}"
 
 
 def number_and_width(value: float, half_width: float) -> tuple[str, str]:
-    """Write a number and half the width of its interval, to four digits at most."""
+    """Write a number and half the width of its interval, to at most four digits."""
     if not math.isfinite(value):
         return "–", ""
     is_plain = value == 0 or 1e-4 <= abs(value) < 1e6
@@ -257,7 +257,7 @@ def number_and_width(value: float, half_width: float) -> tuple[str, str]:
 
 
 def with_width(value: float, half_width: float) -> str:
-    """Write a number with half the width of its interval: 152.7 ± 1.2; as given without one."""
+    """Write a number with half the width of its interval, if any: 152.7 ± 1.2."""
     number, width = number_and_width(value, half_width)
     return f"{number} {width}" if width else _minus(f"{value:.6g}")
 
@@ -267,7 +267,7 @@ def _minus(number: str) -> str:
 
 
 def percentage(share: float) -> str:
-    """Write a share in percent: two significant digits, whole percents from 100 % on."""
+    """Write a share in percent with two significant digits, or as an integer from 100 % on."""
     return f"{two_digits(100 * share)} %"
 
 
@@ -277,7 +277,7 @@ def utc(stamp: float) -> datetime:
 
 
 def in_zone(moment: datetime, zone: str, form: str = "%Y-%m-%d %H:%M") -> str:
-    """Write a moment in a zone, an IANA name, or UTC for none: 2026-07-17 12:00 Europe/Berlin."""
+    """Write a moment in an IANA zone, or in UTC without one: 2026-07-17 12:00 Europe/Berlin."""
     there: tzinfo = timezone.utc
     if zone:
         from zoneinfo import ZoneInfo  # noqa: PLC0415 - the start of a node needs none
@@ -287,7 +287,7 @@ def in_zone(moment: datetime, zone: str, form: str = "%Y-%m-%d %H:%M") -> str:
 
 
 def utc_day(stamp: float) -> str:
-    """Write the day of a stamp, ns since 1970, by ISO 8601, as UTC."""
+    """Write the day of a stamp, ns since 1970, in ISO 8601 and UTC."""
     return f"{utc(stamp):%Y-%m-%d}"
 
 
@@ -297,12 +297,12 @@ def utc_minute(stamp: float) -> str:
 
 
 def utc_second(stamp: float) -> str:
-    """Write a stamp, ns since 1970, by ISO 8601, as UTC, to the second."""
+    """Write a stamp, ns since 1970, in ISO 8601 and UTC, to the second."""
     return f"{utc(stamp):%Y-%m-%dT%H:%M:%SZ}"
 
 
 def member_words(member: Enum, table: str) -> str:
-    """Write a member of an enum by a table of words."""
+    """Write an enum member in the words of a table."""
     return _member(member.name, table)
 
 
@@ -328,7 +328,7 @@ _ABORTS = {
 
 
 def played_test_words(why: str, found: float, limit: float) -> str:
-    """Say why a test goes back, with what was found and its limit."""
+    """Write why a test returns to its start, with the value found and its limit."""
     if not why.startswith("SILENT"):
         return _ABORTS[why].format(found, limit)
     time = f"{found:.2g} s" if math.isfinite(found) else "the whole time"
@@ -349,7 +349,7 @@ def evidence_ratio_words(
     independent: float,
     describes: tuple[bool, bool],
 ) -> str:
-    """Say how strongly a record favours one of two models, and how far to trust that."""
+    """Write how strongly a record favours one of two models, with the limits of this evidence."""
     digits = abs(log_ratio) / math.log(10.0)
     ratio = f"1e{digits:.0f}" if digits >= 4 else f"{10.0**digits:.2g}"
     which = "first" if log_ratio > 0 else "second"
@@ -383,7 +383,7 @@ _LACKS_OF_MOVES = "friction from moves in service"
 
 
 def lack_words(of: str, lack: str, share: float, largest: float) -> str:
-    """Say what is missing to a baseline; `lack` is the name of a `Lack`."""
+    """Write what a baseline lacks; `lack` is the name of a `Lack`."""
     name = _LACKS_OF_MOVES if of == "moves" else words(of)
     known = {"share": share, "largest": largest}
     shares = {key: "–" if math.isnan(one) else percentage(one) for key, one in known.items()}
@@ -409,19 +409,19 @@ _LET_IT_WORK = "Or leave the valve in service: its moves will provide a baseline
 
 
 def lack_remedies(lacks: Sequence[tuple[str, str]]) -> tuple[str, ...]:
-    """Say what may be done about all that is missing, given as what lacks it and its `Lack`."""
+    """Write the remedies for the lacks of a baseline, given as pairs of subject and `Lack` name."""
     found = [one for of, lack in lacks if of != "moves" for one in _LACK_REMEDIES[lack]]
     waits = [_LET_IT_WORK] if any(of == "moves" and lack != "SIZE" for of, lack in lacks) else []
     return tuple(dict.fromkeys([*found, *waits]))
 
 
 def _member(name: str | None, table: str) -> str:
-    """Write a member of an enum; one that no longer exists, in a statement that was kept, too."""
+    """Write an enum member by name, even if a stored statement names a member removed since."""
     return "" if name is None else _TABLES[table].get(name, words(name.lower()))
 
 
 def _ago(age: int) -> str:
-    """Write an age, ns, in whole units; a clock that has gone back since is named."""
+    """Write an age, ns, in whole units; a negative age means that a clock has been set back."""
     seconds = age / 1e9
     if seconds < 0:
         return "in the future: a clock has since been set back"
@@ -431,10 +431,10 @@ def _ago(age: int) -> str:
 
 
 _SMALL_SHARE = 0.05
-"""Share below which it is written in tenths of a percent."""
+"""Shares below this are written in tenths of a percent."""
 
 _SIZES = {"%": 1e2, "mm": 1e3, "ms": 1e3, "mm/s": 1e3}
-"""Units for people that are not the SI units of the facts, by their number in one of these."""
+"""Display units that differ from the SI units of the facts: number of each in one SI unit."""
 
 
 def _difference(change: tuple[float, float, float], unit: str) -> str:
@@ -454,7 +454,7 @@ def _in_unit(value: float, details: str) -> str:
 
 
 def _listed(several: tuple[object, ...], pattern: str) -> str:
-    """Write several by a pattern, ``before|between|after``; nothing for none."""
+    """Join items by the pattern ``before|between|after``; empty without items."""
     before, between, after = pattern.split("|")
     return f"{before}{between.join(map(str, several))}{after}" if several else ""
 
@@ -486,12 +486,12 @@ _FORMATS: dict[str, Callable[[Any, str], str]] = {
     "two": lambda value, unit: two_digits(_SIZES.get(unit, 1.0) * value),
     "words": lambda name, _: words(name),
 }
-"""How a fact is written: ``{fact:name details}``. ``{fact:?this|that}`` chooses by a fact, and
-``{fact:+...}`` is written only where the fact is known; all else is Python's own format."""
+"""Formats of facts: ``{fact:name details}``. ``{fact:?this|that}`` chooses by a fact, and
+``{fact:+...}`` writes a fact only if it is known. Everything else is Python's own format."""
 
 
 class _Writer(string.Formatter):
-    """Fills the facts into a sentence; ``{value,half_width:±}`` takes two of them together."""
+    """Fills the facts into a sentence; ``{value,half_width:±}`` formats two facts together."""
 
     def get_value(self, key: int | str, args: Sequence[Any], kwargs: Mapping[str, Any]) -> Any:
         names = str(key).split(",")
@@ -580,13 +580,13 @@ _TABLES: dict[str, Mapping[str, str]] = {
         "positioner",
     },
 }
-"""Words for the members of enums and for names, by table."""
+"""Words for enum members and names, by table."""
 
 MORE_STROKES = (
     "record more strokes, some fast and some slow, and set timing_uncertainty if the clocks and "
     "lags of both signals are known"
 )
-"""How to know a friction better."""
+"""Advice for a narrower interval of friction."""
 
 _SLIDING_SIZE = "{value,half_width:±} N at {speed:in .3g mm/s} mm/s"
 _HEALTHY = "call ~/set_baseline while it is healthy"
