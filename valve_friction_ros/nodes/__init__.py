@@ -7,14 +7,15 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""ROS 2 nodes: they translate messages and parameters, nothing else.
+"""ROS 2 nodes: they only translate messages and parameters.
 
-Each is a class that any executor of rclpy turns, also beside other nodes in a process of your own::
+Each node is a class that runs in any executor of rclpy, also next to other nodes in your own
+process::
 
     rclpy.init()
     identifier = Identifier(namespace="/fv_101")
     rclpy.spin(identifier)
-    identifier.destroy_node()  # writes what waits
+    identifier.destroy_node()  # writes pending data
 """
 
 import os
@@ -31,5 +32,5 @@ if TYPE_CHECKING:
 else:
     __getattr__ = names_on_demand(__name__)
 
-# Read when numpy is imported: more threads only wait for each other in matrices as small as these.
+# Read when numpy is imported: for such small matrices more threads only wait for each other.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")

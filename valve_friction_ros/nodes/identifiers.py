@@ -33,17 +33,18 @@ from valve_friction_ros.nodes.plumbing.worker import InternalError, bugs_reporte
 from valve_friction_ros.settings import HOST
 
 _FEW = 20
-"""Valves up to which parameters have services, which with those of alarms are 25 of 43 endpoints of
-a valve. Chosen: a host that joins some hundred valves meets thousands of endpoints already."""
+"""Number of valves up to which parameters have services. These and the alarm services are 25 of the
+43 endpoints of a valve. Chosen: a host that joins some hundred valves already discovers thousands
+of endpoints."""
 _TOGETHER = 50
-"""Valves that share a participant of the graph. The middleware compares each reader of a
-participant with all its writers, so that the start would take the square of their number; a
+"""Number of valves that share a participant of the graph. The middleware compares each reader of a
+participant with all its writers, so the time to start grows with the square of this number. A
 participant takes 2 MB and eight threads."""
 _PROFILE = Path(__file__).with_name("many_valves.xml")
 
 
 class _FaultyValve(PolledNode):
-    """Stands in for the identifier of a valve that cannot start: it says so, and does no more."""
+    """Replaces the identifier of a valve that cannot start, and only publishes this problem."""
 
     def __init__(self, place: str, problem: str, context: Context) -> None:
         super().__init__(
@@ -62,7 +63,7 @@ class _FaultyValve(PolledNode):
         self.create_timer(1.0, self._tell, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def stuck_status(self, problem: str) -> DiagnosticStatus:
-        """Return the status of a valve that nobody monitors."""
+        """Return the status of a valve that is not monitored."""
         name = f"{self.get_fully_qualified_name()}: friction"
         return stuck_status(name, self._tag, problem)
 
@@ -74,7 +75,7 @@ class _FaultyValve(PolledNode):
 
 
 def _places(valves: Sequence[str]) -> list[str]:
-    """Return the namespaces of valves by their names."""
+    """Return the namespace of each valve."""
     places = [f"/{valve.strip('/')}" for valve in valves if valve]
     if not places:
         raise ValueError("no valve is named: set the parameter valves, such as [fv_101, fv_102]")
@@ -89,12 +90,12 @@ def _places(valves: Sequence[str]) -> list[str]:
 def _identifiers_of_valves(
     opened: contextlib.ExitStack, arguments: Sequence[str] | None = None
 ) -> Iterator[Node]:
-    """Create the node `identifiers`, and an identifier for each valve of its parameter.
+    """Create the node `identifiers`, and an identifier for each valve in its parameter.
 
-    One that cannot start is logged, and a `_FaultyValve` stands in for it. What they share is
-    closed with `opened`. Raises ValueError if no valve is named, or a valve is named twice, or ROS
-    arguments remap a namespace, or no valve can start; InvalidNamespaceException if a name cannot
-    be a namespace.
+    An identifier that cannot start is logged and replaced by a `_FaultyValve`. Shared resources are
+    closed with `opened`. Raises ValueError if no valve is named, a valve is named twice, ROS
+    arguments remap a namespace, or no valve can start; InvalidNamespaceException if a name is not a
+    valid namespace.
     """
     host = PolledNode("identifiers")
     yield host
@@ -139,7 +140,7 @@ def _identifiers_of_valves(
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the nodes."""
-    if "FASTRTPS_DEFAULT_PROFILES_FILE" not in os.environ:  # Kilted knows it still
+    if "FASTRTPS_DEFAULT_PROFILES_FILE" not in os.environ:  # Kilted still reads it
         os.environ.setdefault(PROFILES, str(_PROFILE))
     with contextlib.ExitStack() as opened:
         return run_nodes(lambda: _identifiers_of_valves(opened, arguments), arguments)

@@ -38,22 +38,22 @@ from valve_friction_ros.records.table import read_columns
 from valve_friction_ros.settings import NODES
 
 _TICK = 1e-3
-"""Shortest time from one publishing to the next, s: at higher rates several samples go together."""
+"""Shortest time between two publications, s: at higher rates they hold several samples."""
 _CATCHING_UP = 2
-"""Times the usual rate at which samples that are late are sent: a burst would overrun the queues of
+"""Rate at which late samples are sent, over the usual rate: a burst would overrun the queues of
 subscribers."""
 _WAITING = 0.02
-"""Time between two looks at a clock that has not begun, s."""
+"""Time between two checks of a clock that has not yet started, s."""
 _BLOCK = 50
-"""Samples that are computed together."""
+"""Number of samples computed together."""
 
 _PARAMETERS = NODES["pressure_source"]
 
 
 def pressure_from_file(path: Path, values: Mapping[str, Any]) -> SampledPressure:
-    """Read a pressure, linear between its rows; raises ValueError where it breaks a limit.
+    """Read a pressure signal from a file, linear between its rows.
 
-    The limits are the parameters ``file_minimum``, ``file_maximum`` and ``file_rate``.
+    Raises ValueError if it exceeds a limit: ``file_minimum``, ``file_maximum`` or ``file_rate``.
     """
     columns = read_columns(path, ("time_s", "pressure_pa"))
     signal = SampledPressure(columns["time_s"], columns["pressure_pa"])
@@ -77,7 +77,7 @@ def _largest_rate(signal: SampledPressure) -> float:
 
 
 def _excitation(values: Mapping[str, Any]) -> Excitation:
-    """Build the signal; raises ValueError for an unknown kind or impossible numbers."""
+    """Build the signal; raises ValueError for an unknown signal or impossible numbers."""
     kind, low, high, period = (values[name] for name in ("excitation", "low", "high", "period"))
     if kind == "file":
         if not values["file"]:
@@ -97,14 +97,14 @@ def _excitation(values: Mapping[str, Any]) -> Excitation:
 
 
 class PressureSource(PacedNode):
-    """Publishes the signal, each sample in time and with its own stamp.
+    """Publishes the signal, each sample at its time and with its own stamp.
 
     Add it to any executor of rclpy. Raises ValueError for an unknown signal or impossible numbers.
 
     Parameters
     ----------
     **named
-        What `rclpy.node.Node` takes, such as `namespace` and `parameter_overrides`.
+        Arguments of `rclpy.node.Node`, such as `namespace` and `parameter_overrides`.
     """
 
     def __init__(self, **named: Any) -> None:
@@ -137,9 +137,9 @@ class PressureSource(PacedNode):
         self.get_logger().info(f"ready: publishing {self._publisher.topic_name}")
 
     def step(self) -> float:
-        """Publish the samples whose time has come; return the time of the next step."""
+        """Publish the samples that are due; return the time of the next step."""
         begun, now = time.monotonic(), self.get_clock().now().nanoseconds
-        if not now:  # use_sim_time, and the clock has not come yet
+        if not now:  # use_sim_time, and no clock received yet
             return begun + _WAITING
         if self._start is None or now < self._start:
             self._start = now
@@ -163,7 +163,7 @@ class PressureSource(PacedNode):
         self._sent += 1
 
     def _compute(self) -> None:
-        """Compute the next block: times from the start, ns, and pressures."""
+        """Compute the next block: times since the start, ns, and pressures."""
         sample = self._computed + np.arange(_BLOCK)
         pressure = self._response(self._excitation.sample(sample * self._period))
         if self._noise > 0:
@@ -176,7 +176,7 @@ class PressureSource(PacedNode):
         self._computed += _BLOCK
 
     def _response(self, command: np.ndarray) -> np.ndarray:
-        """Pass a block through the converter, continuing from the block before."""
+        """Pass a block through the converter, continuing from the previous block."""
         if self._before is None:
             pressure = converter_response(command, self._period, self._lag)
         else:

@@ -7,13 +7,13 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Calls of an identifier's services, of which none is lost; also without the command `ros2`.
+"""Reliable calls of the services of an identifier, without the command `ros2`.
 
-A node that has not met a new client yet answers it in vain, however ready its service is: DDS tells
-both sides at their own pace, on a loaded machine a second late. So a request that does no harm
-twice is made again until it is answered. One that does is made once, after another client of the
-same program has had an answer from the same node: a node meets the clients of a program in the
-order in which they were made.
+A node that has not yet discovered a new client answers it in vain, even if its service is ready:
+DDS informs each side at its own pace, on a loaded machine a second late. An idempotent request is
+therefore repeated until it is answered. Any other request is made once, after another client of the
+same program has received an answer from the same node: a node discovers the clients of a program in
+the order of their creation.
 """
 
 import os
@@ -35,37 +35,37 @@ from valve_friction_ros.health import Level
 from valve_friction_ros.identification import RefusalError
 
 _AGAIN = 0.5
-"""Time without an answer, s, after which a harmless request is made again."""
+"""Time without an answer, s, after which an idempotent request is repeated."""
 _NO_PARAMETERS = 2.0
-"""Time, s, for which the parameters of a node are looked for. Chosen: they are there by default."""
+"""Time to wait for the parameter services of a node, s. Chosen: they exist by default."""
 
 
 class UnansweredError(Exception):
-    """There will be no answer; the message says of which service, and why."""
+    """A service will not answer; the message names the service and the cause."""
 
 
 class LateError(UnansweredError):
-    """There was no answer in time."""
+    """A service did not answer in time."""
 
 
 class PatientRequest:
-    """A request that does no harm twice: it is made again until it is answered.
+    """An idempotent request, repeated until it is answered.
 
     Parameters
     ----------
     node : Node
-        Who asks; its executor is turned between two steps.
+        The calling node; its executor must run between two steps.
     kind : type
         Type of the service.
     name : str
         Name of the service.
     request : message
-        What is asked.
+        The request.
 
     Attributes
     ----------
     answer : message or None
-        The answer, once there is one.
+        The answer, once received.
     """
 
     def __init__(self, node: Node, kind: type, name: str, request: Any) -> None:
@@ -76,11 +76,11 @@ class PatientRequest:
         self._again = 0.0
 
     def is_met(self) -> bool:
-        """Return whether the service is there."""
+        """Return whether the service has been discovered."""
         return bool(self._client.service_is_ready())
 
     def step(self) -> bool:
-        """Go on; return whether there is an answer."""
+        """Continue the request; return whether it has been answered."""
         done = next((one for one in self._pending if one.done()), None)
         if done is not None:
             self.answer = done.result()
@@ -90,12 +90,12 @@ class PatientRequest:
         return self.answer is not None
 
     def close(self) -> None:
-        """Forget it."""
+        """Destroy the client."""
         self._node.destroy_client(self._client)
 
 
 def set_parameters_request(node: Node, target: str, values: Mapping[str, Any]) -> PatientRequest:
-    """Return the request that sets parameters of the node `target`, all at once."""
+    """Return a request that sets parameters of the node `target` atomically."""
     request = SetParametersAtomically.Request(
         parameters=[
             Parameter(name, value=value).to_parameter_msg() for name, value in values.items()
@@ -106,29 +106,29 @@ def set_parameters_request(node: Node, target: str, values: Mapping[str, Any]) -
 
 
 class TriggerCall:
-    """One call of a std_srvs/Trigger service, or of a SetBool one, which is made once.
+    """A single call of a std_srvs/Trigger or SetBool service, never repeated.
 
     Parameters
     ----------
     node : Node
-        Who calls; its executor is turned between two steps.
+        The calling node; its executor must run between two steps.
     identifier : str
-        Fully qualified name of the node that is called.
+        Fully qualified name of the called node.
     service : str
         Name of its service, without the node.
     meeting : float
-        Longest time until the service is met, s.
+        Longest time until the service is discovered, s.
     patience : float
         Longest time until the answer, s.
     values : mapping of str to object, optional
-        Parameters of the node that are set before, all at once; they hold for this call.
+        Parameters of the node to set atomically before the call; they apply to this call.
     switch : bool, optional
-        What a SetBool service is given; None: the service takes nothing.
+        Value for a SetBool service; None: call a Trigger service.
 
     Attributes
     ----------
     answer : Trigger.Response or None
-        The answer, once there is one.
+        The answer, once received.
     """
 
     def __init__(
@@ -157,9 +157,9 @@ class TriggerCall:
         return self._future is not None
 
     def step(self) -> bool:
-        """Go on; return whether there is an answer.
+        """Continue the call; return whether it has been answered.
 
-        Raises UnansweredError if there will be none.
+        Raises UnansweredError if no answer will come.
         """
         if self._client is None:
             self._begin()
@@ -187,7 +187,7 @@ class TriggerCall:
         return False
 
     def _begin(self) -> None:
-        """Make the client, and after it the one whose answer shows that both are known."""
+        """Create the client, then a second client whose answer proves that both are known."""
         try:
             kind = Trigger if self._switch is None else SetBool
             self._client = self._node.create_client(kind, self._name)
@@ -205,7 +205,7 @@ class TriggerCall:
         )
 
     def _is_known(self, waited: float) -> bool:
-        """Return whether the node has met this client; True where it has no parameters to ask."""
+        """Return whether the node knows this client; True for a node without parameter services."""
         greeting = self._greeting
         if greeting is None:
             return True
@@ -216,7 +216,7 @@ class TriggerCall:
         return not self._values and not greeting.is_met() and waited > _NO_PARAMETERS
 
     def close(self) -> None:
-        """Forget it; a call that was made goes on."""
+        """Destroy the clients; a call that was made continues in the node."""
         if self._client is not None:
             self._node.destroy_client(self._client)
         if self._greeting is not None:
@@ -225,11 +225,11 @@ class TriggerCall:
 
 _TURN = 0.05
 _LAST_WORD = 1.5
-"""Time for the diagnosis that follows an answer, s: it is published each second."""
+"""Time to wait for the diagnosis after an answer, s: it is published every second."""
 
 
 class ServiceAnswer(NamedTuple):
-    """What a service said; `level` is that of the diagnosis, where it was asked for and came."""
+    """Answer of a service; `level` is that of the next diagnosis, if requested and received."""
 
     success: bool
     message: str
@@ -237,7 +237,7 @@ class ServiceAnswer(NamedTuple):
 
 
 class Caller:
-    """A client of identifiers, which waits as long as `is_wanted()` is true."""
+    """A client of identifiers; it waits for answers while `is_wanted()` is true."""
 
     def __init__(self, node: Node, is_wanted: Callable[[], bool]) -> None:
         self._node = node
@@ -248,11 +248,11 @@ class Caller:
         self._hears_levels = False
 
     def close(self) -> None:
-        """Stop listening."""
+        """Shut down the executor."""
         self._executor.shutdown()
 
     def _wait(self, done: Callable[[], object], patience: float) -> bool:
-        """Spin until `done()` is true; return whether it is, in time."""
+        """Spin until `done()` is true; return whether it became true in time."""
         deadline = time.monotonic() + patience
         while not (is_done := bool(done())):
             if time.monotonic() > deadline or not self._is_wanted():
@@ -261,7 +261,7 @@ class Caller:
         return is_done
 
     def identifiers(self) -> list[str]:
-        """Return the names of the identifiers that are known now."""
+        """Return the names of the identifiers known at present."""
         return sorted(
             name.removesuffix("/identify")
             for name, types in self._node.get_service_names_and_types()
@@ -269,9 +269,9 @@ class Caller:
         )
 
     def find(self, valve: str, patience: float) -> str:
-        """Return the name of the identifier of a valve, by its namespace or its own name.
+        """Return the name of the identifier of a valve, given its namespace or node name.
 
-        Raises RefusalError, which lists the identifiers there are, if it is not there.
+        Raises RefusalError, with a list of all identifiers, if it is not found.
         """
         wanted = f"/{valve.strip('/')}"
 
@@ -301,9 +301,9 @@ class Caller:
                 self._levels[status.name] = Level(level)
 
     def call(self, identifier: str, service: str, patience: float) -> ServiceAnswer | None:
-        """Call a service and wait for its answer; None where it is not wanted any more.
+        """Call a service and wait for its answer; None if it is no longer wanted.
 
-        Raises RefusalError if there is no answer in time, or the identifier has ended.
+        Raises RefusalError if no answer comes in time or the identifier has ended.
         """
         wants_level = service == "identify"
         if wants_level and not self._hears_levels:
@@ -313,11 +313,11 @@ class Caller:
 
         def has_answered() -> bool:
             if not one.is_made:
-                self._levels.clear()  # of the time before
+                self._levels.clear()  # from before the call
             return one.step()
 
         try:
-            if not self._wait(has_answered, 2 * patience):  # its own patience ends before
+            if not self._wait(has_answered, 2 * patience):  # the call itself gives up earlier
                 return None
         except LateError as error:
             raise RefusalError(f"{error}; allow more time with --timeout") from None
@@ -331,9 +331,9 @@ class Caller:
         return ServiceAnswer(one.answer.success, one.answer.message, self._levels.get(status))
 
     def set_parameters(self, node: str, values: Mapping[str, float], patience: float) -> None:
-        """Set parameters of a node, all at once.
+        """Set parameters of a node atomically.
 
-        Raises RefusalError if the node refuses, or does not answer in time.
+        Raises RefusalError if the node refuses or does not answer in time.
         """
         one = set_parameters_request(self._node, node, values)
         try:
@@ -347,9 +347,9 @@ class Caller:
 
 @contextmanager
 def caller(is_wanted: Callable[[], bool]) -> Iterator[Caller]:
-    """Provide a client, which gives up waiting once `is_wanted()` is false.
+    """Provide a client that stops waiting once `is_wanted()` is false.
 
-    It looks for identifiers, so that a discovery server has to tell it of all that there is.
+    Because it searches for identifiers, a discovery server must give it the whole graph.
     """
     if os.environ.get("ROS_DISCOVERY_SERVER"):
         os.environ.setdefault("ROS_SUPER_CLIENT", "TRUE")

@@ -44,39 +44,41 @@ from valve_friction_ros.settings import NODES
 
 _TICK = 1e-3
 _SELDOM = 0.02
-"""Times between two looks for pressures, s: while they come, and when none has come for a while."""
+"""Times between two checks for pressures, s: while they arrive, and when none has arrived for
+`_WHILE`."""
 _WHILE = 1.0
-"""Time, s, after which pressures no longer come."""
+"""Time, s, without a pressure after which the checks become less frequent."""
 
 _LONGEST = 0.5
-"""Time, s, for which the stem follows pressures in one step: a reliable subscription that is not
-emptied holds its publisher up, and the node must end when it is asked."""
+"""Longest time of one step, s: a reliable subscription that is not emptied blocks its publisher,
+and the node must end on request."""
 
 _MOST_WAITING = 20_000
-"""Pressures that wait until the model is compiled; then the oldest are given up."""
+"""Largest number of pressures that wait while the model is compiled; beyond it the oldest are
+dropped."""
 
 _HIGHEST_PRESSURE = 1e9
-"""Pressure, Pa, beyond any valve: a larger number may overflow the model."""
+"""Highest accepted pressure, Pa, far beyond any valve: larger numbers may overflow the model."""
 
 _PARAMETERS = NODES["simulator"]
 _CHANGEABLE = tuple(one for one in _PARAMETERS if not one.read_only)
 
 
 def _plant(values: Mapping[str, Any]) -> tuple[Valve, KarnoppParameters, float]:
-    """Return the valve, its model and the noise of the position."""
+    """Build the valve, its model and the noise of the position."""
     valve, parameters = valve_from(values), karnopp_parameters_from(values)
     return valve, parameters, require_non_negative("position_noise", values["position_noise"])
 
 
 class Simulator(PacedNode):
-    """Steps the model by the stamps of the pressure and publishes the stem at the same stamps.
+    """Advances the model to each stamp of the pressure and publishes the stem at this stamp.
 
     Add it to any executor of rclpy. Raises ValueError for an impossible valve.
 
     Parameters
     ----------
     **named
-        What `rclpy.node.Node` takes, such as `namespace` and `parameter_overrides`.
+        Arguments of `rclpy.node.Node`, such as `namespace` and `parameter_overrides`.
     """
 
     def __init__(self, **named: Any) -> None:
@@ -101,9 +103,9 @@ class Simulator(PacedNode):
         self._plant = _plant(values_of(self, _CHANGEABLE))
 
     def step(self) -> float:
-        """Let the stem follow the pressures that have arrived; return the time of the next step."""
+        """Simulate the stem for the pressures received; return the time of the next step."""
         begun = time.monotonic()
-        # Taken at once: a reliable subscription that is not emptied slows its publishers down.
+        # Taken at once: a reliable subscription that is not emptied slows down its publishers.
         self._waiting.extend(taken.message for taken in self._pressures.take())
         if self._readiness.look():
             until = begun + _LONGEST

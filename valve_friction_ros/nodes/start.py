@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Entry points of the nodes, light enough to be interrupted before a node is imported."""
+"""Entry points of the nodes, which can be interrupted even before a node is imported."""
 
 import importlib
 import os
@@ -21,25 +21,25 @@ def _end(*_: object) -> None:
 
 
 def _start(node: str) -> int:
-    """Import and run a node; Ctrl-C or SIGTERM while it is still being imported ends it at once."""
-    # An exception in the midst of an import may be lost there.
+    """Import and run a node; Ctrl-C or SIGTERM during the import ends the process at once."""
+    # An exception raised during an import may be swallowed there.
     for request in (signal.SIGINT, signal.SIGTERM):
         signal.signal(request, _end)
     module = importlib.import_module(f"valve_friction_ros.nodes.{node}")
     if {"-h", "--help"} & set(sys.argv[1:]):
-        # Whoever stops reading, as `head` does, ends it without a word.
+        # A reader that stops early, such as `head`, ends the program silently.
         signal.signal(signal.SIGPIPE, signal.SIG_DFL)
         print(_help_text(node.split(".", maxsplit=1)[0], str(module.__doc__)))  # noqa: T201
         return 0
     exit_code: int = module.main()
-    # All is closed: Python would take a second more to take its modules apart.
+    # Everything is closed: Python would need another second to tear down its modules.
     sys.stdout.flush()
     sys.stderr.flush()
     os._exit(exit_code)
 
 
 def _help_text(name: str, purpose: str) -> str:
-    """Say how the executable `name` is run, and what its parameters mean."""
+    """Return the usage of the executable `name` and the meaning of its parameters."""
     import yaml  # noqa: PLC0415 - slow to import
 
     from valve_friction_ros.settings import NODES  # noqa: PLC0415

@@ -35,11 +35,11 @@ from valve_friction_ros.settings import NODES
 
 _PARAMETERS = NODES["stroke_player"]
 _ACKNOWLEDGED = Duration(seconds=1.0)
-"""Time that the last set point has to arrive in before the node ends."""
+"""Time allowed for the delivery of the last set point before the node ends."""
 
 
 def _played(values: Mapping[str, Any]) -> PlayedTest:
-    """Read the test and its limits; raises ValueError where one is missing or does not fit."""
+    """Read the test and its limits; raises ValueError if a limit is missing or violated."""
     signal = pressure_from_file(Path(values["file"]).expanduser(), values)
     margin = values["pressure_margin"]
     limits = PlayLimits(
@@ -54,12 +54,12 @@ def _played(values: Mapping[str, Any]) -> PlayedTest:
 class StrokePlayer(PacedNode):
     """Publishes set points while a test is played, and nothing before.
 
-    Add it to any executor of rclpy. Raises ValueError for a test that breaks its limits.
+    Add it to any executor of rclpy. Raises ValueError for a test that violates its limits.
 
     Parameters
     ----------
     **named
-        What `rclpy.node.Node` takes, such as `namespace` and `parameter_overrides`.
+        Arguments of `rclpy.node.Node`, such as `namespace` and `parameter_overrides`.
     """
 
     def __init__(self, **named: Any) -> None:
@@ -69,7 +69,7 @@ class StrokePlayer(PacedNode):
         self._test = _played(values)
         self._period, self._joint = 1.0 / values["sample_rate"], values["joint"]
         self._told: tuple[PlayPhase, str] | None = None
-        self._lock = threading.Lock()  # services are answered in another thread than the steps
+        self._lock = threading.Lock()  # services and steps run in different threads
         self._publisher = self.create_publisher(FluidPressure, "pressure_set_point", stream())
         self._state = self.create_publisher(String, "~/state", LATCHED)
         self._pressures = PolledSubscription(self, FluidPressure, "actuator_pressure", stream())
@@ -78,7 +78,7 @@ class StrokePlayer(PacedNode):
         create_trigger_service(self, "~/stop", self._stop)
 
     def close(self) -> None:
-        """Go back, and see that this arrives."""
+        """Return to the start of a running test, and wait for the delivery of this set point."""
         super().close()
         with self._lock:
             if self._test.phase is PlayPhase.PLAYING:
@@ -108,7 +108,7 @@ class StrokePlayer(PacedNode):
             self._test.heard_stem(self._position(taken.message), now)
 
     def _position(self, message: JointState) -> float:
-        """Return the position of the stem in a message; nan where it is not there."""
+        """Return the position of the stem in a message, or nan without one."""
         names, positions = list(message.name), message.position
         place = names.index(self._joint) if self._joint in names else 0
         if (self._joint and self._joint not in names) or place >= len(positions):
@@ -116,7 +116,7 @@ class StrokePlayer(PacedNode):
         return float(positions[place])
 
     def step(self) -> float:
-        """Set what is due; return the time of the next step."""
+        """Publish the set point that is due; return the time of the next step."""
         begun = time.monotonic()
         with self._lock:
             self._listen()
@@ -132,7 +132,7 @@ class StrokePlayer(PacedNode):
         self._publisher.publish(message)
 
     def _tell(self) -> None:
-        """Say where the test stands, once it has changed."""
+        """Log and publish the state of the test if it has changed."""
         now = self._test.phase, str(self._test)
         if now == self._told:
             return

@@ -7,4 +7,4 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The dashboard as a node: what the graph says to its pages, and what they ask of it."""
+"""The dashboard as a node: it connects the pages with the ROS graph."""

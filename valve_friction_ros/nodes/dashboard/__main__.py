@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The executable `dashboard`, as ``python -m valve_friction_ros.nodes.dashboard`` runs it."""
+"""Run the executable `dashboard` as ``python -m valve_friction_ros.nodes.dashboard``."""
 
 import sys
 

@@ -66,7 +66,7 @@ from valve_friction_ros.outside_text import printable
 from valve_friction_ros.settings import NODES
 
 _SPAN = 60.0
-"""Seconds of signal that are shown."""
+"""Length of the displayed signals, s."""
 
 
 @dataclass
@@ -77,7 +77,7 @@ class _Watch:
     streams: tuple[PolledSubscription, ...] = ()
 
     def follow(self, node: PolledNode, sources: Sources) -> None:
-        """Subscribe to the topics of the valve, anew where they have changed."""
+        """Subscribe to the topics of the valve, and again whenever they change."""
         if sources != self.sources:
             self.end()
             self.sources, self.strip.trouble = sources, ""
@@ -85,7 +85,7 @@ class _Watch:
                 self._begin(node)
 
     def _begin(self, node: PolledNode) -> None:
-        """Subscribe to both topics or to none: their names come from outside."""
+        """Subscribe to both topics or to neither: their names come from outside."""
         topics = (self.sources.pressure_topic, self.sources.stem_topic)
         for kind, topic in zip((FluidPressure, JointState), topics, strict=True):
             try:
@@ -107,7 +107,7 @@ class _Watch:
         self.sources = Sources()
 
     def take(self) -> None:
-        """Hand over what has arrived; what is no such message is left out."""
+        """Pass the received samples to the strip; skip malformed messages."""
         if not self.streams:
             return
         pressures, stems = (
@@ -123,14 +123,14 @@ class _Watch:
 
 
 class WatchedSignals:
-    """Subscribes to what an identifier subscribes to, as long as somebody looks.
+    """Subscribes to the inputs of an identifier while a page shows them.
 
-    Pages count in and out from any thread; the node's thread subscribes.
+    Pages register and unregister from any thread; the thread of the node subscribes.
 
     Parameters
     ----------
     sources_of : callable
-        Returns the topics of a valve, by the name of its identifier.
+        Returns the topics of a valve for the name of its identifier.
     """
 
     def __init__(self, sources_of: Callable[[str], Sources]) -> None:
@@ -140,14 +140,14 @@ class WatchedSignals:
         self._dropped: list[_Watch] = []
 
     def watch(self, node: str) -> LiveStrip:
-        """Count a page in; return where its samples go."""
+        """Register a page; return the strip that receives its samples."""
         with self._lock:
             watch = self._watches.setdefault(node, _Watch(LiveStrip(_SPAN)))
             watch.lookers += 1
             return watch.strip
 
     def unwatch(self, node: str) -> None:
-        """Count a page out."""
+        """Unregister a page."""
         with self._lock:
             watch = self._watches.get(node)
             if watch is None:
@@ -157,14 +157,14 @@ class WatchedSignals:
                 self._dropped.append(self._watches.pop(node))
 
     def rest(self) -> None:
-        """Unsubscribe from all, until the next step; in the node's thread."""
+        """Unsubscribe from all topics until the next step; call in the thread of the node."""
         with self._lock:
             watches = [*self._watches.values()]
         for watch in watches:
             watch.end()
 
     def step(self, node: PolledNode) -> None:
-        """Subscribe, take and unsubscribe; in the node's thread."""
+        """Subscribe, take samples and unsubscribe; call in the thread of the node."""
         with self._lock:
             watches, dropped = dict(self._watches), self._dropped
             self._dropped = []
@@ -176,27 +176,27 @@ class WatchedSignals:
 
 
 _MEETING = 3.0
-"""Longest time until a service is met, s."""
+"""Longest time until a service is discovered, s."""
 _PATIENCE = 600.0
 """Longest time until an answer, s."""
 
 
 class ServiceCalls:
-    """Calls services for pages: they ask in their thread, and the node's thread calls."""
+    """Calls services for pages: a page requests in its thread, the thread of the node calls."""
 
     def __init__(self) -> None:
         self._asked: SimpleQueue[tuple[str, ServiceRequest, Future[Answer]]] = SimpleQueue()
         self._under_way: list[tuple[TriggerCall, Future[Answer]]] = []
 
     async def call(self, node: str, request: ServiceRequest) -> Answer:
-        """Call a service of an identifier and wait for its answer; any thread's event loop."""
+        """Call a service of an identifier and await its answer, in the event loop of any thread."""
         answer: Future[Answer] = Future()
         answer.set_running_or_notify_cancel()
         self._asked.put((node, request, answer))
         return await asyncio.shield(asyncio.wrap_future(answer))
 
     def rest(self, node: Node) -> None:
-        """Give up the calls under way, as the node rests; in the node's thread."""
+        """Abandon all pending calls when the node rests; call in the thread of the node."""
         self.step(node)
         for call, answer in self._under_way:
             answer.set_result(
@@ -206,7 +206,7 @@ class ServiceCalls:
         self._under_way = []
 
     def step(self, node: Node) -> None:
-        """Go on with all calls; in the node's thread."""
+        """Continue all calls; call in the thread of the node."""
         while not self._asked.empty():
             identifier, (name, values, switch), answer = self._asked.get_nowait()
             call = TriggerCall(node, identifier, name, _MEETING, _PATIENCE, values, switch)
@@ -215,7 +215,7 @@ class ServiceCalls:
 
 
 def _has_ended(call: TriggerCall, answer: "Future[Answer]") -> bool:
-    """Go on with a call; return whether it has ended, with its answer set."""
+    """Continue a call; return whether it has ended, and then set its answer."""
     try:
         if not call.step():
             return False
@@ -231,19 +231,19 @@ def _has_ended(call: TriggerCall, answer: "Future[Answer]") -> bool:
 
 _LITTLE_ENDIAN = b"\x00\x01"
 _AFTER_STAMP = 12
-"""First byte after the representation's header (4 bytes) and the stamp (8)."""
+"""First byte after the encapsulation header (4 bytes) and the stamp (8)."""
 _COUNT = struct.Struct("<I")
 _KEYS = tuple(_COUNT.pack(len(key.encode()) + 1) + key.encode() + b"\0" for key in ESSENTIAL_KEYS)
-"""The essential keys as they stand in a message: their length, their text and a zero byte."""
+"""The essential keys as encoded in a message: length, text and a zero byte."""
 
 
 def statuses_in(message: bytes) -> Iterator[Unread]:
     """Yield each status of a diagnostic_msgs/DiagnosticArray, still unread.
 
-    rclpy takes 0.2 ms to turn the status of an identifier into objects, a tenth of a core for 500
-    valves a second. Here the name is read as the message comes, the rest once a page shows it.
+    rclpy takes 0.2 ms to deserialise the status of an identifier, a tenth of a core for 500 valves
+    per second. Here only the name is read on receipt, the rest once a page shows it.
 
-    Raises ValueError if the bytes are no such message.
+    Raises ValueError if the bytes are not such a message.
     """
     try:
         if message[:2] == _LITTLE_ENDIAN:
@@ -256,7 +256,7 @@ def statuses_in(message: bytes) -> Iterator[Unread]:
 
 
 def status_of(message: DiagnosticStatus) -> Status:
-    """Return a status of a message."""
+    """Convert a status message."""
     return Status(
         message.name,
         message.level[0],
@@ -277,7 +277,7 @@ def _quickly(message: bytes) -> Iterator[Unread]:
 
 
 def _status_at(message: bytes, at: int) -> Status:
-    """Read a status; raises ValueError if the bytes are none."""
+    """Read a status; raises ValueError if the bytes do not encode a status."""
     try:
         return _read(message, at)[0]
     except (struct.error, IndexError) as error:
@@ -285,9 +285,9 @@ def _status_at(message: bytes, at: int) -> Status:
 
 
 def _mark(message: bytes, begin: int, end: int) -> tuple[object, ...]:
-    """Return level, message, tag and the values of the essential keys, a tenth of all.
+    """Return level, message, tag and the values of the essential keys, a tenth of all keys.
 
-    The bytes between two texts are left out: they may be any.
+    The padding between two texts is left out, because it is arbitrary.
     """
     try:
         _, at = _text(message, begin + 1)
@@ -303,7 +303,7 @@ def _mark(message: bytes, begin: int, end: int) -> tuple[object, ...]:
 
 
 def _count(message: bytes, at: int) -> tuple[int, int]:
-    at += -at % 4  # the representation's header takes four bytes, so alignment counts from zero
+    at += -at % 4  # the header has four bytes, so it does not shift the alignment
     return _COUNT.unpack_from(message, at)[0], at + 4
 
 
@@ -329,12 +329,12 @@ def _read(message: bytes, at: int) -> tuple[Status, int]:
 
 
 _PAUSE = 0.05
-"""Time between two turns, s: for so long messages gather."""
+"""Time between two turns, s, during which messages accumulate."""
 _MISSING = f"cannot start: the dashboard needs NiceGUI, which is not installed: run `{INSTALL}`"
 
 
 def _options(values: Mapping[str, Any]) -> DashboardOptions:
-    """Return the options that parameters give; raises ValueError or OSError for wrong ones."""
+    """Build the options from parameters; raises ValueError or OSError if they are wrong."""
 
     def file(name: str) -> Path | None:
         return Path(values[name]).expanduser() if values[name] else None
@@ -360,15 +360,15 @@ def _options(values: Mapping[str, Any]) -> DashboardOptions:
 
 
 class Dashboard(ManagedNode):
-    """Hears the valves and fills their store; calls services for the pages.
+    """Stores the diagnostics of the valves, and calls services for the pages.
 
-    The executable `dashboard` serves the pages beside it. Raises ValueError or OSError for wrong
+    The executable `dashboard` also serves the pages. Raises ValueError or OSError for wrong
     parameters.
 
     Parameters
     ----------
     **named
-        What `rclpy.node.Node` takes, such as `parameter_overrides`.
+        Arguments of `rclpy.node.Node`, such as `parameter_overrides`.
     """
 
     def __init__(self, **named: Any) -> None:
@@ -393,13 +393,13 @@ class Dashboard(ManagedNode):
         return Sources() if heard is None else heard.view.sources
 
     def poll(self) -> None:
-        """Take what has been heard, and go on with what is asked."""
+        """Process the diagnostics received and the requests of the pages."""
         now = time.monotonic()
         heard = self._diagnostics.take()
         if not self.is_active:
             return
         for taken in heard:
-            with contextlib.suppress(ValueError):  # anybody can publish other bytes
+            with contextlib.suppress(ValueError):  # anyone can publish other bytes
                 for status in statuses_in(taken.message):
                     self.plant.hear(status, now)
         self.calls.step(self)
@@ -407,7 +407,7 @@ class Dashboard(ManagedNode):
 
 
 class _Turning(Companion):
-    """Takes the node's turns in a thread."""
+    """Runs the turns of the node in a thread."""
 
     def __init__(self, node: Dashboard) -> None:
         super().__init__("graph")
@@ -426,7 +426,7 @@ class _Turning(Companion):
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the node and the server of its pages until Ctrl-C or SIGTERM; return the exit code."""
+    """Run the node and its web server until Ctrl-C or SIGTERM; return the exit code."""
     keep_little_memory()
     try:
         rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
@@ -436,7 +436,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return cannot_start(error)
     with contextlib.ExitStack() as limited:
         try:
-            with _Turning(node):  # it meets the valves while the library of the pages is imported
+            with _Turning(node):  # discovers the valves while the web library is imported
                 return _serve(node, limited)
         finally:
             node.destroy_node()
@@ -446,9 +446,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _serve(node: Dashboard, limited: contextlib.ExitStack) -> int:
     """Serve the pages of a node; return the exit code.
 
-    Once it serves, Ctrl-C leaves a limited time to all that is within `limited`.
+    Once the server runs, Ctrl-C limits the time of everything in `limited`.
     """
-    # Libraries for other uses: engineio, httpx and uvicorn, imported below, do without them.
+    # Optional libraries that engineio, httpx and uvicorn, imported below, do not need.
     for unused in ("aiohttp", "tornado", "httpx._main", "watchfiles"):
         sys.modules.setdefault(unused, None)  # type: ignore[arg-type]
     try:
