@@ -7,4 +7,4 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""What the nodes share: messages, parameters, qualities of service, running and stopping."""
+"""Common parts of the nodes: messages, parameters, quality of service, start and stop."""

@@ -7,9 +7,9 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Nodes that are managed by their life cycle, where their parameter `lifecycle` asks for it.
+"""Nodes with a managed life cycle, if their parameter `lifecycle` is true.
 
-The states and services are those of ROS 2 (``ros2 lifecycle``), by rclpy's own implementation.
+States and services are those of ROS 2 (``ros2 lifecycle``) in rclpy's own implementation.
 """
 
 import contextlib
@@ -25,22 +25,22 @@ from valve_friction_ros.nodes.plumbing.polled_node import PolledNode
 from valve_friction_ros.nodes.plumbing.worker import bugs_reported
 
 _WRONG = (ParameterException, RuntimeError, ValueError, OSError)
-"""What a node raises where its parameters do not let it be configured."""
+"""Exceptions of a node that cannot be configured with its parameters."""
 
 
 class ManagedNode(LifecycleNodeMixin, PolledNode):
-    """A node that is active from its start, or from a transition that somebody asks for.
+    """A node that is active from its start, or after a requested transition.
 
-    A subclass declares its parameters, `lifecycle` among them, in its constructor, which ends with
-    `begin`. *Unconfigured*, it has parameters and nothing else; *inactive*, it has all its topics
-    and services, and takes, publishes and answers nothing; *active*, it works.
+    The constructor of a subclass declares its parameters, including `lifecycle`, and ends with
+    `begin`. An *unconfigured* node has only parameters. An *inactive* node has all its topics and
+    services, but takes, publishes and answers nothing. An *active* node works.
 
     Attributes
     ----------
     is_configured, is_active : bool
-        Whether it has what it works with, and whether it works.
+        Whether the node is configured, and whether it is active.
     opened : contextlib.ExitStack
-        What `configure` has opened, and is closed with the node or its clean-up.
+        Resources that `configure` has opened; closed with the node or by its clean-up.
     """
 
     def __init__(self, *arguments: Any, **named: Any) -> None:
@@ -51,7 +51,7 @@ class ManagedNode(LifecycleNodeMixin, PolledNode):
     def begin(self) -> None:
         """Configure and activate the node, unless its life cycle is managed.
 
-        What `configure` raises leaves the graph without the node.
+        If `configure` raises an exception, the node is removed from the graph.
         """
         if self.get_parameter("lifecycle").value:
             LifecycleNodeMixin.__init__(self, callback_group=self._services_in_turns)
@@ -65,7 +65,7 @@ class ManagedNode(LifecycleNodeMixin, PolledNode):
         self.is_active = True
 
     def configure(self) -> None:
-        """Build what the node works with; raises ValueError where parameters are wrong."""
+        """Create all entities and resources of the node; raises ValueError for wrong parameters."""
         raise NotImplementedError
 
     def _configure(self) -> None:
@@ -74,7 +74,7 @@ class ManagedNode(LifecycleNodeMixin, PolledNode):
         self.is_configured = True
 
     def _entities(self) -> list[tuple[Any, Callable[[Any], object]]]:
-        """Return all publishers, services and so on, each with what destroys it."""
+        """Return all publishers, services and so on, each with the function that destroys it."""
         return [
             (one, destroy)
             for entities, destroy in (
@@ -88,12 +88,12 @@ class ManagedNode(LifecycleNodeMixin, PolledNode):
         ]
 
     def close(self) -> None:
-        """Close what is open; the end of a node in whatever state."""
+        """Close all resources; the end of a node in any state."""
         self.is_active = self.is_configured = False
         self.opened.close()
 
     def _dissolve(self) -> None:
-        """Go back to what the node was before it was configured."""
+        """Return the node to the state before its configuration."""
         self.close()
         for one, destroy in self._entities():
             if id(one) not in self._before and one is not self._poll_timer:
@@ -123,12 +123,12 @@ class ManagedNode(LifecycleNodeMixin, PolledNode):
         return called
 
     def poll_guarded(self) -> None:
-        """Do the work that is due, once the node is configured."""
+        """Do the work that is due if the node is configured."""
         if self.is_configured:
             super().poll_guarded()
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Build what the node works with; a wrong parameter leaves it unconfigured."""
+        """Configure the node; a wrong parameter leaves it unconfigured."""
         with self._callbacks_lock:
             try:
                 with bugs_reported(self, *_WRONG):
@@ -141,27 +141,27 @@ class ManagedNode(LifecycleNodeMixin, PolledNode):
         return super().on_configure(state)
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Begin to work."""
+        """Start to work."""
         self.is_active = True
         return super().on_activate(state)
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Rest; what is known is kept."""
+        """Stop working, but keep all data."""
         self.is_active = False
         return super().on_deactivate(state)
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Give up all but the parameters."""
+        """Release everything except the parameters."""
         with self._callbacks_lock, self.guarded("cleanup"):
             self._dissolve()
         return super().on_cleanup(state)
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Give up all but the parameters, for good."""
+        """Release everything except the parameters, permanently."""
         if self.is_configured:
             return self.on_cleanup(state)
         return super().on_shutdown(state)
 
     def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Go back to unconfigured after a bug in a transition, which is in the log."""
+        """Return to unconfigured after a bug in a transition, which has been logged."""
         return self.on_cleanup(state)

@@ -7,12 +7,12 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Conversion between messages and plain numbers, also of serialised messages by the block.
+"""Conversion between messages and plain numbers, also in blocks of serialised messages.
 
 In the messages of a publisher only stamps and numbers change; frame, joint names and counts are the
-same bytes at the same places. So the first message shows where the numbers are, and NumPy reads
-them from all messages at once, if the other bytes are equal. Messages of different layouts are
-deserialised by rclpy.
+same bytes at the same offsets. The first message therefore shows the offset of the numbers, and
+NumPy reads them from all messages at once if the other bytes are equal. If the layouts differ,
+rclpy deserialises the messages.
 """
 
 import struct
@@ -34,27 +34,26 @@ _NANOSECONDS = 1_000_000_000
 
 
 def stamp_of(time: Time) -> int:
-    """Time of a message in whole nanoseconds."""
+    """Convert the time of a message to whole nanoseconds."""
     stamp: int = time.sec * _NANOSECONDS + time.nanosec
     return stamp
 
 
 def time_message(stamp: int) -> Time:
-    """Message of a time in whole nanoseconds."""
+    """Convert a time in whole nanoseconds to a message."""
     seconds, nanoseconds = divmod(stamp, _NANOSECONDS)
     return Time(sec=seconds, nanosec=nanoseconds)
 
 
 def position_of(message: JointState, joint: str) -> float | None:
-    """Position of `joint` in m, of the first joint for an empty name; None if it is not there."""
+    """Return the position of `joint`, m, or None; an empty name means the first joint."""
     return joint_position(message.name, message.position, joint)
 
 
 def rows_of(messages: Sequence[Float64MultiArray]) -> Arrivals:
-    """Take the samples out of blocks that follow each other: a row each of s, Pa and m.
+    """Return the samples of consecutive blocks, each with one row of s, Pa and m per sample.
 
-    Raises ValueError if the layout of one is not that of such a block; the message says what it
-    should be.
+    Raises ValueError if the layout of a block is wrong; the message describes the correct layout.
     """
     tables, labels = zip(*map(_table_of, messages), strict=True)
     if any(one != labels[0] for one in labels):
@@ -63,7 +62,7 @@ def rows_of(messages: Sequence[Float64MultiArray]) -> Arrivals:
 
 
 def _table_of(message: Float64MultiArray) -> tuple[NDArray[np.float64], list[str]]:
-    """Return the numbers of a block, a row each sample, and what its columns are labelled."""
+    """Return the numbers of a block, one row per sample, and the labels of its columns."""
     dimensions = message.layout.dim
     if len(dimensions) != 2:
         raise ValueError(f"the layout has {len(dimensions)} dimensions, not sample × columns")
@@ -82,13 +81,13 @@ def _table_of(message: Float64MultiArray) -> tuple[NDArray[np.float64], list[str
 
 _LITTLE_ENDIAN = b"\x00\x01"
 _BODY = 4
-"""First byte after the representation's header, from which alignment counts."""
+"""First byte after the encapsulation header; the origin of the alignment."""
 _STAMP = slice(_BODY, _BODY + 8)
 _DOUBLE = 8
 
 
 class _Layout(NamedTuple):
-    """Where a message has its number, and which bytes up to there every message repeats."""
+    """Offset of the number in a message, and the bytes before it that every message repeats."""
 
     number: int
     repeated: NDArray[np.bool_]
@@ -152,7 +151,7 @@ def _position_layout(message: bytes, joint: str) -> _Layout:
 def _alike(
     messages: Sequence[bytes], layout_of: Callable[[bytes], _Layout]
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]] | None:
-    """Return stamps and numbers of messages that are laid out alike, else None."""
+    """Return the stamps and numbers of messages with equal layouts, or None if they differ."""
     try:
         layout = layout_of(messages[0])
     except (struct.error, ValueError):
@@ -172,12 +171,12 @@ def _alike(
 
 
 def readable(taken: Sequence[TakenMessage], kind: type) -> list[TakenMessage]:
-    """Return those serialised messages that are of their type; anybody can publish other bytes."""
+    """Return the serialised messages that are valid; anyone can publish other bytes."""
 
     def is_readable(data: bytes) -> bool:
         try:
             deserialize_message(data, kind)
-        except RuntimeError:  # rclpy's
+        except RuntimeError:  # of rclpy
             return False
         return True
 
@@ -199,7 +198,7 @@ def pressures_in(messages: Sequence[bytes]) -> Samples:
 
 
 def positions_in(messages: Sequence[bytes], joint: str) -> Arrivals:
-    """Return what serialised sensor_msgs/JointState messages hold of `joint`, m."""
+    """Return the positions of `joint` in serialised sensor_msgs/JointState messages, m."""
     alike = _alike(messages, lambda one: _position_layout(one, joint)) if messages else None
     if alike is not None:
         return Arrivals(np.full(len(messages), Kind.POSITION, np.uint8), *alike)
@@ -215,15 +214,15 @@ def positions_in(messages: Sequence[bytes], joint: str) -> Arrivals:
 def arrivals_of(
     pressures: Sequence[TakenMessage], stems: Sequence[TakenMessage], joint: str
 ) -> Arrivals:
-    """Return the samples of serialised messages of both topics, in the order of their receipt.
+    """Return the samples of serialised messages from both topics, in order of receipt.
 
     The messages are sensor_msgs/FluidPressure and sensor_msgs/JointState; an empty `joint` means
-    the first joint. Raises RuntimeError if one of them is no such message.
+    the first joint. Raises RuntimeError if a message has another type.
     """
     pressure = pressures_in([one.message for one in pressures])
     stem = positions_in([one.message for one in stems], joint)
     kinds = np.concatenate([np.full(len(pressures), Kind.PRESSURE, np.uint8), stem.kinds])
-    # Messages of a topic stay as they came, though the clock of their receipt may be set back.
+    # The messages of a topic keep their order even if the clock of the receipts is set back.
     receipts = [np.array([one.received for one in part], np.int64) for part in (pressures, stems)]
     received = np.concatenate([np.maximum.accumulate(part) for part in receipts])
     order = np.argsort(received, kind="stable")

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Files that a node writes on request: their folder, their names, and the room they may take."""
+"""Files that a node writes on request: folder, names and limit of disk space."""
 
 import contextlib
 import os
@@ -26,22 +26,22 @@ from valve_friction_ros.records.files import data_folder
 from valve_friction_ros.streams import utc
 
 _BLOCK = 4096
-"""Bytes that the smallest file takes on most disks."""
+"""Disk space of the smallest file on most file systems, bytes."""
 
 
 def folder_of(given: str, usual: str) -> Path:
-    """Return the folder that a parameter gives, or else the `usual` one in the data folder.
+    """Return the folder given by a parameter, by default the folder `usual` in the data folder.
 
-    It is absolute, and its links are followed. A relative one lies in the data folder.
+    The path returned is absolute, with links resolved. A relative path starts in the data folder.
 
     Raises
     ------
     ValueError
-        If a relative one leads out of the data folder, by ``..`` or by a link.
+        If a relative path leads out of the data folder, by ``..`` or by a link.
     RuntimeError
         If the home directory in the path is unknown.
     OSError
-        If its links run in a circle.
+        If links form a loop.
     """
     home = data_folder().expanduser().resolve()
     if not given:
@@ -57,16 +57,16 @@ def folder_of(given: str, usual: str) -> Path:
 
 
 class OutputFolder:
-    """The folder for one kind of files, fixed when the node starts.
+    """The folder for one kind of file, fixed when the node starts.
 
     Parameters
     ----------
     given : str
-        What the parameter says.
+        Value of the parameter.
     usual : str
-        Name in the data folder, where nothing is given.
+        Default name in the data folder.
     content : str
-        What is written there, with its article; refusals name it.
+        Description of the files with its article, for messages of refusal.
 
     Raises
     ------
@@ -79,17 +79,17 @@ class OutputFolder:
         self._folder = Path(given or usual)
         try:
             self._folder = folder_of(given, usual)
-        except RuntimeError as error:  # pathlib's, where a home directory is unknown
+        except RuntimeError as error:  # of pathlib, if a home directory is unknown
             self._problem = f"{given or '~/.ros'}: {error}"
         except OSError as error:
             self._problem = f"{given}: {error.strerror or error}"
 
     @contextlib.contextmanager
     def opened(self) -> Iterator[Path]:
-        """Provide the folder, which is made if it is not there; in any thread.
+        """Provide the folder, created if missing; in any thread.
 
-        Raises RefusalError if it was not found at the start, leads elsewhere since by a link, or
-        the block raises OSError.
+        Raises RefusalError if the folder could not be resolved at the start, a link has since
+        redirected it, or the block raises OSError.
         """
         if self._problem:
             raise RefusalError(f"cannot write {self._content} into {self._problem}")
@@ -114,10 +114,10 @@ class OutputFolder:
         worker: ThreadPoolExecutor,
         write: Callable[[Path, str], Path],
     ) -> Path:
-        """Have something written in a thread of `worker`, if the node's valve has room for it.
+        """Write a file in a thread of `worker`, if the valve has disk space left.
 
-        `write` is given the folder and the name of a file at this time (ns), and returns the path.
-        Raises RefusalError, and removes what was written, if there is no room.
+        `write` receives the folder and a file name for this time (ns), and returns the path. Raises
+        RefusalError and removes the file if there is not enough space.
         """
         valve, name = valve_name(node), file_name(node, stamp)
         room = 1e6 * node.get_parameter("save_megabytes").value
@@ -140,19 +140,19 @@ class OutputFolder:
 
 
 def valve_name(node: Node) -> str:
-    """Name the node's valve as a part of file names; ROS allows no dots and other signs in it."""
+    """Return the name of the node's valve for file names; ROS allows no dots or signs in it."""
     return node.get_namespace().strip("/").replace("/", "_") or node.get_name()
 
 
 def file_name(node: Node, stamp: int) -> str:
-    """Name a file, without its ending, after the node's valve and a time (ns)."""
+    """Return a file name, without extension, from the node's valve and a time (ns)."""
     return f"{valve_name(node)}_{utc(stamp):%Y%m%dT%H%M%SZ}"
 
 
 def free_path(folder: Path, name: str, ending: str) -> Path:
-    """Return the first path of this name, or with a number after it, that is not there.
+    """Return the first path with this name, numbered if necessary, that does not exist.
 
-    A link is there, wherever it leads.
+    A link exists even if its target does not.
     """
     names = (
         f"{name}{ending}" if number == 1 else f"{name}_{number}{ending}" for number in count(1)
@@ -161,7 +161,7 @@ def free_path(folder: Path, name: str, ending: str) -> Path:
 
 
 def _size_of(path: Path) -> int:
-    """Return the bytes that a file, or the files of a folder, take on a disk; a link takes none."""
+    """Return the disk space of a file or of all files in a folder, bytes; a link takes none."""
     if path.is_symlink():
         return 0
     if path.is_dir():
@@ -170,12 +170,12 @@ def _size_of(path: Path) -> int:
 
 
 def require_room(folder: Path, valve: str, room: float, is_there: bool = False) -> None:
-    """Refuse to write more where the files of a valve in a folder take their room, bytes.
+    """Require that the files of a valve in a folder take less than `room`, bytes.
 
-    Only what is named as `file_name` names it is of the valve. What has just been written
-    (`is_there`) may fill the room.
+    Files belong to the valve if they are named as by `file_name`. If the last file has already been
+    written (`is_there`), they may take exactly `room`.
 
-    Raises RefusalError if there is no room.
+    Raises RefusalError if they take more.
     """
     pattern = re.compile(rf"{re.escape(valve)}_\d{{8}}T\d{{6}}Z(_\d+)?(\.html)?")
     taken = sum(_size_of(one) for one in folder.iterdir() if pattern.fullmatch(one.name))

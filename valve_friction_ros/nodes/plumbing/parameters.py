@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Settings as parameters of a node: declared, checked, read, and what is built from them."""
+"""Settings as parameters of a node: declaration, checks, values, and objects built from them."""
 
 import contextlib
 import functools
@@ -31,12 +31,12 @@ from valve_friction_ros.outside_text import nearest, resembling
 from valve_friction_ros.settings import KARNOPP, NODE_NAMES, VALVE, Setting, is_known
 
 _TURNS_SIGNALS = ("columns.inverted_position", "columns.opposing_pressure_column")
-"""Keys of a valve file that change the signals of a table, and which topics do not have."""
+"""Keys of a valve file that convert the signals of a table, but have no effect on topics."""
 
 
 @functools.cache
 def _descriptor(setting: Setting) -> ParameterDescriptor:
-    """Return the ROS description of a setting, which all nodes of the process share."""
+    """Return the ROS descriptor of a setting, shared by all nodes of the process."""
     descriptor = ParameterDescriptor(
         description=setting.description,
         additional_constraints=f"one of {', '.join(setting.choices)}" if setting.choices else "",
@@ -59,10 +59,11 @@ def _descriptor(setting: Setting) -> ParameterDescriptor:
 def declare_parameters(node: Node, settings: Iterable[Setting], **defaults: object) -> None:
     """Declare `settings` on `node`; raises rclpy's parameter exceptions for a bad override.
 
-    `defaults` are those that this node has in place of the declared ones. A number may be set later
-    as its text, because ``ros2 param load`` sends ``.nan`` and ``1e-06`` as texts. Raises
-    ValueError for an override whose name no node of this package has, if it was given by ``-p`` or
-    resembles one; others, as in a file that nodes of several packages share, are logged.
+    `defaults` replace the declared defaults on this node. A number may later be set as text,
+    because ``ros2 param load`` sends ``.nan`` and ``1e-06`` as text. Raises ValueError for an
+    override with a name that no node of this package declares, if it was given by ``-p`` or
+    resembles a declared name. Other unknown overrides, as in a file shared with other packages, are
+    logged.
     """
     declared = tuple(settings)
     _require_known(node, {one.name for one in declared})
@@ -85,7 +86,10 @@ def declare_parameters(node: Node, settings: Iterable[Setting], **defaults: obje
 
 
 def _wrong_type(settings: Iterable[Setting], changes: Iterable[Parameter]) -> str:
-    """Return what is no number of parameters that may be unset, which rclpy leaves open."""
+    """Return the problem with a parameter that may be unset and is not a number, or ''.
+
+    rclpy does not check the type of these.
+    """
     unset = {one.name for one in settings if one.default is None}
     for one in changes:
         if one.name in unset and one.type_ not in (Parameter.Type.NOT_SET, Parameter.Type.DOUBLE):
@@ -94,13 +98,13 @@ def _wrong_type(settings: Iterable[Setting], changes: Iterable[Parameter]) -> st
 
 
 def _typed_names(arguments: Sequence[str]) -> set[str]:
-    """Return the names that stand behind ``-p``, in any node's favour."""
+    """Return the names of the parameters given by ``-p``, for any node."""
     behind = (word for option, word in itertools.pairwise(arguments) if option in ("-p", "--param"))
     return {word.partition(":=")[0].rpartition(":")[2] for word in behind}
 
 
 def _require_known(node: Node, names: Collection[str]) -> None:
-    """Refuse overrides that nothing would ever read."""
+    """Refuse or log overrides that no node reads."""
     typed = _typed_names(sys.argv)
     for name in parameter_overrides(node):
         if name in names or is_known(name):
@@ -115,7 +119,7 @@ def _require_known(node: Node, names: Collection[str]) -> None:
 
 
 def warn_of_columns(node: Node) -> None:
-    """Warn, once, of what a valve file says of its tables and topics must have by themselves."""
+    """Warn once of keys of a valve file that convert tables, but have no effect on topics."""
     overrides = parameter_overrides(node)
     if found := [key for key in _TURNS_SIGNALS if key in overrides and overrides[key].value]:
         node.get_logger().warning(
@@ -126,7 +130,7 @@ def warn_of_columns(node: Node) -> None:
 
 
 def _read(parameter: Parameter) -> Parameter:
-    """Return a number for a text that is one; else the parameter as it is."""
+    """Convert text that is a number to a number; return other parameters unchanged."""
     if parameter.type_ == Parameter.Type.STRING:
         text = parameter.value.replace(".nan", "nan").replace(".inf", "inf")
         with contextlib.suppress(ValueError):
@@ -137,7 +141,7 @@ def _read(parameter: Parameter) -> Parameter:
 def values_of(
     node: Node, settings: Iterable[Setting], changes: Iterable[Parameter] = ()
 ) -> dict[str, Any]:
-    """Values of the parameters by name, as they would be after `changes`; None where unset."""
+    """Return the values of the parameters by name after `changes`; None if unset."""
     values = {one.name: node.get_parameter(one.name).value for one in settings}
     for parameter in changes:
         if parameter.name in values:
@@ -150,7 +154,7 @@ def reject_invalid(
     settings: Iterable[Setting],
     build: Callable[[Mapping[str, Any]], object],
 ) -> None:
-    """Have `node` reject any change with which `build`, fed all values, raises ValueError."""
+    """Make `node` reject changes for which `build`, called with all values, raises ValueError."""
     watched = tuple(settings)
     names = {one.name for one in watched}
 
@@ -169,7 +173,7 @@ def reject_invalid(
 
 
 def valve_from(values: Mapping[str, Any]) -> Valve:
-    """Build the valve from parameter values; raises ValueError for an impossible one."""
+    """Build the valve from parameter values; raises ValueError if they are impossible."""
     taken = {
         one.name: one.assumed if values[one.name] is None else values[one.name] for one in VALVE
     }
@@ -177,5 +181,5 @@ def valve_from(values: Mapping[str, Any]) -> Valve:
 
 
 def karnopp_parameters_from(values: Mapping[str, Any]) -> KarnoppParameters:
-    """Build the model from parameter values; raises ValueError for an impossible one."""
+    """Build the model from parameter values; raises ValueError if they are impossible."""
     return KarnoppParameters(**{one.name: values[one.name] for one in KARNOPP})

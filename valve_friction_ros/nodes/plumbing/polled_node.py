@@ -7,10 +7,10 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Nodes that look for their messages themselves, and the executor of their services.
+"""Nodes that poll their messages, and the executor of their services.
 
-In `TurnExecutor`, which the executables use, a node costs little. In any executor of rclpy it does
-the same: its services are ready as those of other nodes are, and a timer polls its streams.
+In `TurnExecutor`, which the executables use, a node costs little. In any executor of rclpy it
+behaves the same: services work as those of other nodes, and a timer polls the streams.
 """
 
 import contextlib
@@ -54,35 +54,36 @@ from valve_friction_ros.nodes.plumbing.rclpy_private import (
 from valve_friction_ros.nodes.plumbing.worker import InternalError, bugs_reported
 
 _LONGEST_TURN = 0.5
-"""Time, s, after which what is still ready waits for the next turn."""
+"""Longest time of a turn, s; callbacks that are still ready wait for the next turn."""
 _NO_TYPE_DESCRIPTIONS = Parameter("start_type_description_service", value=False)
 _UNSET = ("null", "None")
-"""What ``ros2 param`` makes of a parameter that is not set, in its file and in its request."""
+"""Text that ``ros2 param`` uses for an unset parameter, in its file and in its request."""
 _POLL_PERIOD = 0.05
-"""Time, s, from one look for messages to the next in an executor of rclpy's."""
+"""Period of polling in an executor of rclpy, s."""
 _STEP_PATIENCE = 1.0
-"""Time, s, that the end leaves to a step that a full queue of the middleware holds up."""
+"""Time that the end allows for a step blocked by a full queue of the middleware, s."""
 
 
 class NeverReady(CallbackGroup):
-    """A callback group from which no executor waits for anything."""
+    """A callback group that no executor waits for."""
 
     def can_execute(self, entity: Any) -> bool:  # noqa: ARG002 - rclpy's signature
         """Return False."""
         return False
 
     def beginning_execution(self, entity: Any) -> bool:
-        """Return whether an executor may run the callback of what it has waited for."""
+        """Return whether an executor may run the callback of an entity it has waited for."""
         return self.can_execute(entity)
 
     def ending_execution(self, entity: Any) -> None:
-        """Do nothing: others may begin at any time."""
+        """Do nothing: other callbacks may start at any time."""
 
 
 class _TakenInTurns(NeverReady):
-    """The callback group of services: a `TurnExecutor` takes their requests, others wait for them.
+    """The callback group of services: a `TurnExecutor` takes their requests without waiting.
 
-    Callbacks that are awaiting something let others run, and the node's lock keeps them apart.
+    Other executors wait for them as usual. A callback lets others run while it awaits something;
+    otherwise the lock of the node keeps them apart.
     """
 
     has_turns = False
@@ -94,33 +95,34 @@ class _TakenInTurns(NeverReady):
 class PolledNode(Node):
     """A node that polls its streams, in `run_nodes` and `TurnExecutor` or in any executor.
 
-    Its publishers and subscriptions watch no events of the middleware, save where they are given
-    callbacks for them. rclpy watches two events of each by default, only to log that a quality of
-    service or a type does not match; each would be looked at in every turn of the executor, and
-    rmw_fastrtps can lock up while it takes an event.
+    Publishers and subscriptions watch events of the middleware only if they are given callbacks for
+    them. By default rclpy watches two events of each, only to log that a quality of service or a
+    type does not match. Every turn of the executor would check each of these, and rmw_fastrtps can
+    deadlock while it takes an event.
 
-    Its callbacks exclude each other, also in an executor with several threads, but for what another
-    callback does while one is awaiting something.
+    Callbacks exclude each other, even in an executor with several threads, except while one awaits
+    something.
 
     Parameters
     ----------
     *arguments, **named
-        What `rclpy.node.Node` takes.
+        Arguments of `rclpy.node.Node`.
     start_type_description_service : bool
         Whether the node has the service ``~/get_type_description``, if its parameter allows.
 
     Attributes
     ----------
     last_heard : float
-        When a message of its streams was taken last, s of the monotonic clock; at first its start.
+        Time of the last message taken from its streams, s of the monotonic clock; initially the
+        start.
     awaited : dict of str to str
-        Topics that it subscribes to once somebody publishes them, with their types.
+        Topics to which it subscribes once they have a publisher, with their types.
     offered : dict of str to str
-        Topics that it publishes once somebody subscribes to them, with their types.
+        Topics that it publishes once they have a subscriber, with their types.
     tells_parameters : bool
         Whether it has services for its parameters.
     is_active : bool
-        Whether it works; only a `ManagedNode` may rest.
+        Whether it works; only a `ManagedNode` may be inactive.
     """
 
     is_active = True
@@ -148,7 +150,7 @@ class PolledNode(Node):
 
     @property
     def executor(self) -> Executor | None:
-        """The executor that the node has been added to; None if there is none."""
+        """The executor of the node, or None."""
         return Node.executor.fget(self)
 
     @executor.setter
@@ -156,7 +158,7 @@ class PolledNode(Node):
         Node.executor.fset(self, executor)
         has_turns = isinstance(executor, TurnExecutor)
         self._services_in_turns.has_turns = has_turns
-        for service in self.services:  # those that rclpy itself has made too
+        for service in self.services:  # including those made by rclpy
             service.callback_group = self._services_in_turns
         for entity in (*self.services, *self.timers):
             if (callback := getattr(entity.callback, "__wrapped__", None)) is not None:
@@ -172,7 +174,7 @@ class PolledNode(Node):
     def create_publisher(self, kind: Any, topic: str, *arguments: Any, **named: Any) -> Publisher:
         """Create a publisher as rclpy does, without its default callbacks for events.
 
-        Nobody is told of the parameters of a node that has no services for them.
+        A node without services for its parameters publishes no parameter events.
         """
         if topic == "/parameter_events" and not self.tells_parameters:
             return types.SimpleNamespace(publish=lambda _: None)
@@ -187,22 +189,22 @@ class PolledNode(Node):
     def create_service(
         self, kind: Any, name: str, callback: Callable[..., Any], **named: Any
     ) -> Service:
-        """Create a service as rclpy does; a `TurnExecutor` looks for its requests itself."""
+        """Create a service as rclpy does; a `TurnExecutor` polls its requests."""
         named["callback_group"] = self._services_in_turns
         return super().create_service(kind, name, self.exclusive(callback), **named)
 
     def create_timer(
         self, timer_period_sec: float, callback: Callable[..., Any], *arguments: Any, **named: Any
     ) -> Timer:
-        """Create a timer as rclpy does."""
+        """Create a timer as rclpy does, with an exclusive callback."""
         made = self.exclusive(callback)
         return super().create_timer(timer_period_sec, made, *arguments, **named)
 
     def set_parameters_atomically(self, changes: list[Parameter]) -> SetParametersResult:
-        """Set parameters as rclpy does; what would change nothing is no change.
+        """Set parameters as rclpy does, but ignore those that keep their value.
 
-        So ``ros2 param load`` takes what ``ros2 param dump`` has written, though rclpy refuses to
-        set a parameter that can only be given at the start.
+        ``ros2 param load`` can thus load the output of ``ros2 param dump``, although rclpy refuses
+        to set a read-only parameter.
         """
         new = [one for one in changes if not self._has(one)]
         return (
@@ -216,10 +218,10 @@ class PolledNode(Node):
         return wanted == now or (now is None and wanted in _UNSET)
 
     def exclusive(self, callback: Callable[..., Any]) -> Callable[..., Any]:
-        """Return a callback that runs while no other of this node does, in whatever thread.
+        """Return a callback that excludes all others of this node, in any thread.
 
-        One that is a coroutine lets the others run while it awaits something. Where the executor
-        knows no coroutines, it holds the executor up, and polls the streams meanwhile.
+        A coroutine lets the others run while it awaits something. If the executor does not support
+        coroutines, it blocks the executor and polls the streams meanwhile.
         """
         if inspect.iscoroutinefunction(callback):
 
@@ -248,37 +250,37 @@ class PolledNode(Node):
         return alone
 
     def poll(self) -> None:
-        """Do the work that is due; called in every turn."""
+        """Do the work that is due; called every turn."""
 
     def close(self) -> None:
-        """Do what the node has to do at its end; called once, before the node is destroyed."""
+        """Finish the work of the node; called once, before the node is destroyed."""
 
     def finish(self) -> None:
-        """Close the node, unless that has been done."""
+        """Close the node if it is not yet closed."""
         if not self._is_closed:
             self._is_closed = True
             with self._callbacks_lock, self.guarded("close"):
                 self.close()
 
     def destroy_node(self) -> None:
-        """Close the node, and take it off the graph."""
+        """Close the node and remove it from the graph."""
         self.finish()
         super().destroy_node()
 
     @property
     def failures(self) -> tuple[str, ...]:
-        """The bugs in the latest work of the node, one line each; none once that work succeeds."""
+        """Bugs in the latest work of the node, one line each, until that work succeeds."""
         return tuple(dict.fromkeys(self._failures.values()))
 
     def failure_of(self, work: str) -> str | None:
-        """Return the bug in the latest work of this name; None if there was none."""
+        """Return the bug in the latest work of this name, or None."""
         return self._failures.get(work)
 
     @contextlib.contextmanager
     def guarded(self, work: str) -> Iterator[None]:
-        """Keep a bug in some work to this node: it is logged once, and the process goes on.
+        """Confine a bug in some work to this node: log it once, and let the process continue.
 
-        `failures` has it until work of the same name succeeds.
+        The bug is in `failures` until work of the same name succeeds.
         """
         try:
             with bugs_reported(self, known=self._failures.get(work)):
@@ -294,14 +296,14 @@ class PolledNode(Node):
             self.poll()
 
     def overdue(self) -> str | None:
-        """Say which work in another thread has not ended within its limit; None if there is none.
+        """Describe work in another thread that exceeds its time limit, or return None.
 
         May be called in any thread.
         """
         return None
 
     def stuck_status(self, problem: str) -> DiagnosticStatus | None:  # noqa: ARG002
-        """Return what is published in the node's stead while it is stuck; None for nothing.
+        """Return the status to publish on behalf of the node while it is stuck, or None.
 
         May be called in any thread.
         """
@@ -309,11 +311,10 @@ class PolledNode(Node):
 
 
 class PacedNode(PolledNode):
-    """A node that takes steps in a thread of its own, from its first turn to its end.
+    """A node that runs its steps in its own thread, from its first turn to its end.
 
-    A loop that looks at its node every 20 ms sends what is due by then in a burst, of which a
-    subscriber with an ordinary queue of 10 hears a part. A bug in a step is logged once, and counts
-    among the `failures`.
+    A loop with a turn every 20 ms would send all due messages in a burst, and a subscriber with the
+    usual queue of 10 would lose some. A bug in a step is logged once and is one of the `failures`.
     """
 
     def __init__(self, *arguments: Any, **named: Any) -> None:
@@ -322,16 +323,16 @@ class PacedNode(PolledNode):
         self._thread = threading.Thread(target=self._take_steps, name="steps", daemon=True)
 
     def step(self) -> float:
-        """Do what is due; return the time of the next step, s of the monotonic clock."""
+        """Do the work that is due; return the time of the next step, s of the monotonic clock."""
         raise NotImplementedError
 
     def poll(self) -> None:
-        """Take steps from now on, if that has not begun."""
+        """Start the steps on the first turn."""
         if self._thread.ident is None:
             self._thread.start()
 
     def close(self) -> None:
-        """Take no further step."""
+        """Stop the steps."""
         self._has_ended = True
         if self._thread.is_alive():
             self._thread.join(_STEP_PATIENCE)
@@ -341,7 +342,7 @@ class PacedNode(PolledNode):
             following = time.monotonic() + _STEP_PATIENCE
             with self.guarded("step"):
                 following = self.step()
-            # An event that is waited for costs twice as much.
+            # Waiting for an event costs twice as much.
             if (pause := following - time.monotonic()) > 0:
                 time.sleep(pause)
 
@@ -350,7 +351,7 @@ class PacedNode(PolledNode):
 def _stepwise(
     work: Coroutine[Any, Any, Any], lock: contextlib.AbstractContextManager[Any]
 ) -> Generator[Any, Any, Any]:
-    """Run a coroutine with a lock that is free while it awaits something."""
+    """Run a coroutine under a lock that is released while it awaits something."""
     told = None
     while True:
         with lock:
@@ -362,12 +363,12 @@ def _stepwise(
 
 
 class TurnExecutor(SingleThreadedExecutor):
-    """Runs what is ready and returns; it never waits in the middleware.
+    """Runs the callbacks that are ready and returns; it never waits in the middleware.
 
-    A bug in a callback costs the node that it belongs to, and no other.
+    A bug in a callback affects only the node of this callback.
 
-    A wait of rclpy costs about 10 µs for each service of its nodes, and a look whether one has a
-    request 2 µs. So the services of a `PolledNode` are no part of the wait: it is for the timers.
+    A wait of rclpy costs about 10 µs per service of its nodes, a check for a request only 2 µs. The
+    services of a `PolledNode` are therefore excluded from the wait, which serves the timers.
     """
 
     def __init__(self, *arguments: Any, **named: Any) -> None:
@@ -375,7 +376,7 @@ class TurnExecutor(SingleThreadedExecutor):
         self._answers: list[Task] = []
 
     def turn(self) -> bool:
-        """Run what is ready; return whether a service has a new or an unanswered request."""
+        """Run the ready callbacks; return whether a service has a new or unanswered request."""
         is_lively = False
         until = time.monotonic() + _LONGEST_TURN
         while True:
@@ -383,23 +384,23 @@ class TurnExecutor(SingleThreadedExecutor):
             self._run_ready()
             self._answers = [one for one in self._answers if not one.done()]
             is_lively |= asked or bool(self._answers)
-            # A service that has answered may have more requests, but the streams have their turn.
+            # A service may have more requests after its answer, but the streams must have a turn.
             if not asked or time.monotonic() > until:
                 return is_lively
 
     def answer(self) -> None:
-        """Answer what has been asked of services; timers wait for the next turn."""
+        """Answer requests to services; timers wait for the next turn."""
         self._take_requests()
         for task in self._answers:
             task()
 
     def _take_requests(self) -> bool:
-        """Begin to answer the requests that have come; return whether there are any."""
+        """Start to answer the new requests; return whether there are any."""
         before = len(self._answers)
         for node in self.get_nodes():
             for service in node.services:
                 is_mine = isinstance(service.callback_group, _TakenInTurns)
-                # One at a time, as rclpy runs the newest of its tasks first.
+                # One request at a time, because rclpy runs the newest of its tasks first.
                 if is_mine and takes_directly(service) and (found := take_request(service)):
                     self._answers.append(self.create_task(_answer, node, service, *found))
         return len(self._answers) > before
@@ -407,7 +408,7 @@ class TurnExecutor(SingleThreadedExecutor):
     def _run_ready(self) -> None:
         has_run = False
 
-        def is_done() -> bool:  # ends the look when all that was ready has run
+        def is_done() -> bool:  # ends the loop when all ready callbacks have run
             return has_run
 
         with contextlib.suppress(TimeoutException, ShutdownException, ConditionReachedException):
@@ -416,16 +417,16 @@ class TurnExecutor(SingleThreadedExecutor):
                 has_run = True
                 with _kept_to(node, f"callback {id(entity)}"):
                     task()
-                    task.result()  # raises what the callback has raised
+                    task.result()  # reraises exceptions of the callback
 
 
 def _kept_to(node: Node | None, work: str) -> contextlib.AbstractContextManager[None]:
-    """Keep a bug in the work of a node to it, if it is a `PolledNode`."""
+    """Confine a bug in the work of a node to this node, if it is a `PolledNode`."""
     return node.guarded(work) if isinstance(node, PolledNode) else contextlib.nullcontext()
 
 
 async def _answer(node: Node, service: Service, request: object, header: object) -> None:
-    """Answer a request; one that meets a bug stays without an answer."""
+    """Answer a request; after a bug there is no answer."""
     with _kept_to(node, service.srv_name):
         response = await await_or_execute(service.callback, request, service.srv_type.Response())
         service.send_response(response, header)
@@ -438,11 +439,11 @@ def create_service(
     work: Callable[[Any], Awaitable[str]],
     failure: str = "",
 ) -> None:
-    """Create a service whose answer is `success` and `message`, as those of std_srvs are.
+    """Create a service that answers with `success` and `message`, like those of std_srvs.
 
-    The coroutine `work` is given the request. It returns the message of a success, or raises
-    RefusalError with the reason; anything else that it raises is answered as an internal error. A
-    refusal is logged behind the words of `failure`, if there are any.
+    The coroutine `work` receives the request. It returns the message of a success, or raises
+    RefusalError with the reason; any other exception is answered as an internal error. If `failure`
+    is given, a refusal is logged after this text.
     """
 
     async def answer(request: Any, response: Any) -> Any:

@@ -7,15 +7,15 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Subscriptions whose messages are taken when the node asks for them.
+"""Subscriptions whose messages the node takes when it wants them.
 
-An executor that waits for a subscription looks at every entity of all its nodes for each message:
-0.3 cores for two topics at 1 kHz. An executor that the middleware calls for each message is
-cheaper, but rclpy has it as an experiment only, and its callbacks run under the middleware's locks,
-which has frozen nodes. So the streams are emptied some 20 times a second.
+An executor that waits for a subscription checks every entity of all its nodes for each message: 0.3
+cores for two topics at 1 kHz. An executor that the middleware calls for each message is cheaper,
+but in rclpy it is only experimental, and its callbacks run under locks of the middleware, which has
+frozen nodes. The streams are therefore emptied about 20 times a second.
 
-An executor of rclpy's that ignores callback groups hands the messages over one by one, and so does
-each executor where `rclpy_private` finds no other way; then they wait here until they are taken.
+An rclpy executor that ignores callback groups delivers the messages one by one, and so does every
+executor if `rclpy_private` finds no other way. They are then buffered here until they are taken.
 """
 
 import time
@@ -34,24 +34,24 @@ from valve_friction_ros.nodes.plumbing.rclpy_private import take_messages, takes
 from valve_friction_ros.streams import LossCounter, Losses
 
 _MOST = 3_000
-"""Messages that are taken in a turn: some 30 ms of work, so that a storm on one valve holds up the
-others no longer. At ten turns a second that is 30 kHz."""
+"""Largest number of messages taken in a turn: about 30 ms of work, so a burst on one valve delays
+the others no longer than that. At ten turns a second this is 30 kHz."""
 
 
 _LEASE = 20.0
-"""Time, s, after which the middleware (Fast DDS) forgets a node that has ended without farewell. A
-reliable publisher of long queues serves a new node only then."""
+"""Time, s, after which the middleware (Fast DDS) drops a node that has ended without notice. A
+reliable publisher with long queues serves a new node only then."""
 
 
 class TakenMessage(NamedTuple):
-    """A message, and when it was received, ns of the system's clock."""
+    """A message and its time of receipt, ns of the system clock."""
 
     message: Any
     received: int
 
 
 class InputWatch:
-    """Says what is wrong with one subscribed `topic`; silence is real time, also with sim time."""
+    """Detects problems of a subscribed `topic`; silence is in real time, even with sim time."""
 
     def __init__(self, node: Node, topic: str, type_name: str) -> None:
         self._node = node
@@ -60,20 +60,20 @@ class InputWatch:
         self._has_arrived = False
 
     def arrived(self) -> None:
-        """Note that a message has come."""
+        """Record the arrival of a message."""
         self._since = time.monotonic()
         self._has_arrived = True
 
     def silence(self) -> float:
-        """Return the time since the last message, or the start, s."""
+        """Return the time since the last message, or since the start, s."""
         return time.monotonic() - self._since
 
     def is_used(self) -> bool:
-        """Return whether a message has ever come, or the topic has a publisher."""
+        """Return whether a message has ever arrived or the topic has a publisher."""
         return self._has_arrived or self._node.count_publishers(self.topic) > 0
 
     def problem(self, timeout: float) -> str | None:
-        """Say what is wrong if nothing has come for `timeout` seconds, else None."""
+        """Describe the problem if no message has arrived for `timeout` s, else return None."""
         silence = self.silence()
         if silence <= timeout:
             return None
@@ -93,23 +93,23 @@ class InputWatch:
 
 
 class PolledSubscription:
-    """A subscription that no executor waits for, where that can be helped.
+    """A subscription that no executor waits for, if this can be avoided.
 
-    Its history, depth and reliability can be overridden by ``qos_overrides.…`` parameters. The
-    depth of `quality` must hold what arrives between two calls of `take`. With `raw` messages are
-    taken as they came, serialised. With `is_optional` it is no part of the graph, and of what the
-    node `awaits`, until `follow_publishers` finds a publisher.
+    Parameters ``qos_overrides.…`` can override history, depth and reliability. The depth of
+    `quality` must suffice for the messages between two calls of `take`. With `raw`, messages stay
+    serialised. With `is_optional`, the subscription joins the graph only once `follow_publishers`
+    finds a publisher; until then its topic is among those `awaited` by the node.
 
     Attributes
     ----------
     topic : str
-        Its topic, fully resolved.
+        Fully resolved topic.
     type_name : str
-        Type of its messages, such as ``sensor_msgs/msg/JointState``.
+        Type of the messages, such as ``sensor_msgs/msg/JointState``.
     has_more : bool
-        Whether the last call of `take` may have left some messages.
+        Whether the last call of `take` may have left messages behind.
     watch : InputWatch
-        Whether messages come.
+        Monitors the arrival of messages.
     """
 
     def __init__(
@@ -157,15 +157,15 @@ class PolledSubscription:
         return made
 
     def _hand_over(self, message: Any) -> None:
-        """Keep a message that an executor has taken; the oldest goes where the depth is reached.
+        """Buffer a message taken by an executor; beyond the depth the oldest is dropped.
 
-        Its details stay unasked: rclpy's EventsExecutor fails where a callback wants them.
+        The callback does not ask for message info, because rclpy's EventsExecutor would fail.
         """
         self._handed_over.append((message, {"received_timestamp": time.time_ns()}))
 
     @property
     def quality(self) -> QoSProfile:
-        """The quality of service that it asks for."""
+        """The requested quality of service."""
         return self._quality if self._subscription is None else self._subscription.qos_profile
 
     def end(self) -> None:
@@ -175,10 +175,11 @@ class PolledSubscription:
             self._subscription = None
 
     def follow_publishers(self) -> bool:
-        """Ask for what the publishers offer, if they are there; tell if that is something new.
+        """Adapt the reliability to that of the publishers, if any; return whether it changed.
 
-        That is best effort, which hears all of them, if one of them is; else what was asked for
-        at first. What has arrived and was not taken is lost, so this is for a silent topic.
+        If any publisher is best effort, the subscription becomes best effort, which receives from
+        all of them; else it returns to its first reliability. Messages not yet taken are lost, so
+        call this for a silent topic.
         """
         if not self._node.count_publishers(self.topic):
             return False
@@ -199,10 +200,10 @@ class PolledSubscription:
         return True
 
     def take(self, is_all: bool = False) -> list[TakenMessage]:
-        """Take what has arrived, oldest first.
+        """Take the messages that have arrived, oldest first.
 
-        What exceeds 3,000 messages waits for the next turn; with `is_all` all is taken that the
-        queue can have held at the call.
+        Messages beyond 3,000 wait for the next turn. With `is_all` it takes as many as the queue
+        can have held at the time of the call.
         """
         if self._subscription is None:
             return []
@@ -219,12 +220,12 @@ class PolledSubscription:
             self._node.last_heard = now
             self.watch.arrived()
             known = [number for number in numbers if number is not None]
-            if len(known) == len(numbers):  # a middleware need not number them
+            if len(known) == len(numbers):  # not every middleware numbers messages
                 self._counter.take(known, now)
         self.has_more = len(taken) == most
         return taken
 
     @property
     def losses(self) -> Losses:
-        """The messages that were published and not taken."""
+        """Messages that were published but not taken."""
         return self._counter.losses(time.monotonic())

@@ -7,9 +7,9 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Work in processes of its own, which end when there is none, and each of which may die.
+"""Work in separate processes, which end when idle and may crash without harm to the node.
 
-What identifies and what draws holds more memory than all the rest of a node, and seldom works.
+Identification and drawing hold more memory than the rest of a node, and are seldom active.
 """
 
 import contextlib
@@ -31,8 +31,8 @@ from valve_friction_ros.identification import RefusalError
 _Result = TypeVar("_Result")
 
 _KEPT = 10.0
-"""Time, s, for which a process waits for more work. It holds some 240 MB, and its start takes a
-second of processor time."""
+"""Time, s, for which an idle process waits for more work. A process holds some 240 MB, and its
+start takes a second of processor time."""
 
 
 _MALLOC = {-8: 2, -3: 131_072, -1: 131_072}
@@ -40,10 +40,10 @@ _MALLOC = {-8: 2, -3: 131_072, -1: 131_072}
 
 
 def keep_little_memory() -> None:
-    """Let all threads share two arenas of glibc's memory, and give back what is free at once.
+    """Make all threads share two arenas of glibc, which return free memory at once.
 
-    An arena a thread took the dashboard 50 MB more, and kept pages of the browser 10 MB. Large
-    arrays cost more time then. Elsewhere than with glibc nothing is done.
+    With one arena per thread the dashboard took 50 MB more, and served pages kept 10 MB. The price
+    is that large arrays cost more time. Without glibc nothing is done.
     """
     with contextlib.suppress(AttributeError, OSError):
         mallopt = ctypes.CDLL(None).mallopt
@@ -52,39 +52,39 @@ def keep_little_memory() -> None:
 
 
 def give_back_memory() -> None:
-    """Give back what is free now: after work that took much and is seldom done.
+    """Return free memory to the system, after rare work that took a lot of it.
 
-    Elsewhere than with glibc nothing is done.
+    Without glibc nothing is done.
     """
     with contextlib.suppress(AttributeError, OSError):
         ctypes.CDLL(None).malloc_trim(0)
 
 
 class ElsewhereError(Exception):
-    """The cause of an exception that another process has raised: its traceback, file and line."""
+    """Cause of an exception raised in another process: its traceback, file and line."""
 
     file = ""
     line = 0
 
 
 def imported(module: str, name: str, *arguments: Any) -> Any:
-    """Call a function of a module that is imported where it is called."""
+    """Import a module in the process of this call, and call a function of it."""
     return getattr(import_module(module), name)(*arguments)
 
 
 class ThisProcess:
-    """Does work where it is called."""
+    """Runs work in the calling thread."""
 
     def done(self, work: Callable[..., _Result], *arguments: Any) -> _Result:
-        """Do some work; return what it returns, and raise what it raises."""
+        """Run `work`; return its result or raise its exception."""
         return work(*arguments)
 
     def end(self) -> None:
-        """Do no more work."""
+        """Stop working."""
 
 
 class _Child:
-    """A process that does one work after the other, as its input tells it to."""
+    """A process that runs one job after the other from its input."""
 
     def __init__(self) -> None:
         self._process = subprocess.Popen(
@@ -92,12 +92,12 @@ class _Child:
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             env=os.environ | {"PYTHONPATH": os.pathsep.join(map(os.path.abspath, sys.path))},
-            start_new_session=True,  # Ctrl-C is the parent's
+            start_new_session=True,  # Ctrl-C is for the parent
         )
         self.end_later: threading.Timer | None = None
 
     def done(self, work: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
-        """Have some work done; return what it returns, or the exception that it raises, and which.
+        """Run `work` in the child; return its result, or its exception and where it was raised.
 
         Raises EOFError or OSError if the child dies.
         """
@@ -109,15 +109,15 @@ class _Child:
 
     def end(self) -> None:
         self._process.kill()
-        with contextlib.suppress(OSError):  # it has ended with something left to read
+        with contextlib.suppress(OSError):  # it ended with output left to read
             self._process.communicate()
 
 
 class Processes(ThisProcess):
-    """Processes that are started when there is work, and end some seconds after the last one.
+    """Processes that start on demand and end some seconds after their last job.
 
-    They are started anew, not forked: a fork would hold the locks of the middleware's threads, and
-    not the threads. They end with this process, however it ends.
+    They are spawned, not forked: a fork would keep the locks of the middleware's threads without
+    the threads. They end with this process, however it ends.
     """
 
     def __init__(self) -> None:
@@ -126,9 +126,9 @@ class Processes(ThisProcess):
         self._lock = threading.Lock()
 
     def done(self, work: Callable[..., _Result], *arguments: Any) -> _Result:
-        """Have some work done, a function of a module, while this thread waits.
+        """Run `work`, a function of a module, in a process while this thread waits.
 
-        Raises what it raises, and RefusalError if its process dies.
+        Raises the exception of `work`, or RefusalError if the process dies.
         """
         child = self._taken()
         try:
@@ -149,12 +149,12 @@ class Processes(ThisProcess):
         return answer
 
     def end(self) -> None:
-        """End all processes, with what they do."""
+        """End all processes, including their present work."""
         for child in [*self._all]:
             self._end(child)
 
     def _taken(self) -> _Child:
-        """Return the process that has worked last, of those that are free, or a new one."""
+        """Return the idle process that has worked most recently, or a new process."""
         with self._lock:
             while self._free:
                 child = self._free.pop()
@@ -190,7 +190,7 @@ def _packed(what: object) -> bytes:
 
 
 def _answered(wanted: bytes) -> bytes:
-    """Do what is wanted; return the result, or the exception and where it was raised."""
+    """Run a pickled job; return the result, or the exception and where it was raised."""
     try:
         work, arguments = pickle.loads(wanted)  # noqa: S301 - of the node that started this
         return _packed((work(*arguments), None, None))
@@ -202,11 +202,11 @@ def _answered(wanted: bytes) -> bytes:
 
 
 def serve() -> None:
-    """Do what the input says, one after the other, until it ends with the parent."""
-    for request in (signal.SIGINT, signal.SIGTERM):  # they are the parent's
+    """Run the jobs from the input one after the other, until it closes with the parent."""
+    for request in (signal.SIGINT, signal.SIGTERM):  # for the parent
         signal.signal(request, signal.SIG_IGN)
     answers = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
-    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # what the work prints is no answer
+    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # keeps printed text out of the answers
     wanted: queue.SimpleQueue[bytes] = queue.SimpleQueue()
 
     def listen() -> None:
@@ -222,5 +222,5 @@ def serve() -> None:
 
 
 if __name__ == "__main__":
-    # So that its classes are those of the parent.
+    # Imported by name, so that its classes are those of the parent.
     import_module("valve_friction_ros.nodes.plumbing.processes").serve()

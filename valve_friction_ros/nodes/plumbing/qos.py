@@ -7,23 +7,24 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Quality of service of the topics, in one place."""
+"""Quality of service of all topics."""
 
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-"""Results: a late subscriber receives the last one."""
+"""For results: a late subscriber receives the last message."""
 
 REQUESTS = QoSProfile(depth=100)
-"""Requests to a service, ten times as many as usual: they wait for the executor's next turn."""
+"""For requests to a service, ten times as deep as usual: they wait for the next turn of the
+executor."""
 
 
 def stream() -> QoSProfile:
     """Return the quality of service of a sensor stream.
 
-    Deep enough for 20 s at 1 kHz while the receiver is busy. Every topic needs a profile of its
-    own, because rclpy writes a topic's overrides into the profile that it is given.
+    It is deep enough for 20 s at 1 kHz while the receiver is busy. Every topic needs its own
+    profile, because rclpy writes the overrides of a topic into it.
     """
     return QoSProfile(depth=20_000)
 
@@ -34,22 +35,22 @@ def blocks() -> QoSProfile:
 
 
 def statuses() -> QoSProfile:
-    """Return the quality of service of the statuses of a plant, each of which is soon replaced.
+    """Return the quality of service of the diagnostics of a plant, which are soon replaced.
 
-    Deep enough for 4 s of 500 valves while the receiver is busy. The middleware keeps the memory of
-    the longest queue there was: at the depth of a stream that is 100 MB.
+    It is deep enough for 4 s of 500 valves while the receiver is busy. The middleware never frees
+    the memory of its longest queue: at the depth of a stream that is 100 MB.
     """
     return QoSProfile(depth=2_000)
 
 
 def watched() -> QoSProfile:
-    """Return the quality of service of a stream that somebody looks at.
+    """Return the quality of service of a displayed stream.
 
-    It takes what is published either way, and holds no publisher up.
+    It matches publishers of either reliability and never blocks them.
     """
     return QoSProfile(depth=5_000, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 
 def qos_overrides() -> QoSOverridingOptions:
-    """Let history, depth and reliability be overridden by ``qos_overrides.…`` parameters."""
+    """Let parameters ``qos_overrides.…`` override history, depth and reliability."""
     return QoSOverridingOptions.with_default_policies()

@@ -7,11 +7,11 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""What rclpy offers no public way to do: the only file of the package that reaches behind it.
+"""Uses of private parts of rclpy, all in this file.
 
-Its own executors and ``wait_for_message`` take messages and requests in this way. Where a version
-of rclpy no longer has it, the nodes leave their streams and services to the executor: they work as
-before and cost more. The versions are those with which the tests have run.
+rclpy's own executors and ``wait_for_message`` take messages and requests in this way. If a version
+of rclpy no longer supports it, the nodes leave their streams and services to the executor: they
+work as before but cost more.
 """
 
 from typing import Any
@@ -31,34 +31,34 @@ PROFILES = (
     if hasattr(Executor, "create_future")
     else "FASTRTPS_DEFAULT_PROFILES_FILE"
 )
-"""The variable that names a profile of Fast DDS: that of Kilted warns of the one of Jazzy."""
+"""Environment variable that names a profile of Fast DDS: Kilted warns about the name of Jazzy."""
 
 
 def takes_directly(entity: Subscription | Service) -> bool:
-    """Return whether this rclpy lets messages, or requests, be taken without an executor."""
+    """Return whether this rclpy can take messages or requests without an executor."""
     way = "take_message" if isinstance(entity, Subscription) else "service_take_request"
     return hasattr(entity.handle, way)
 
 
 def take_messages(subscription: Subscription, most: int) -> list[tuple[Any, dict[str, Any]]]:
-    """Take at most `most` messages, each with what the middleware says of it."""
+    """Take at most `most` messages, each with its info from the middleware."""
     taken: list[tuple[Any, dict[str, Any]]] = []
     kind, raw, handle = subscription.msg_type, subscription.raw, subscription.handle
-    with handle:  # so that nothing destroys it meanwhile
+    with handle:  # prevents its destruction meanwhile
         while len(taken) < most and (found := handle.take_message(kind, raw)) is not None:
             taken.append(found)
     return taken
 
 
 def take_request(service: Service) -> tuple[Any, Any] | None:
-    """Take the next request and its header; None if there is none."""
+    """Take the next request with its header, or return None."""
     with service.handle:
         request, header = service.handle.service_take_request(service.srv_type.Request)
     return None if header is None else (request, header)
 
 
 def awaits_coroutines(executor: Executor | None) -> bool:
-    """Return whether an executor awaits callbacks that are coroutines.
+    """Return whether an executor awaits coroutine callbacks.
 
     The experimental EventsExecutor of Jazzy sends the coroutine itself as the response. That of
     Kilted, whose executors create futures, awaits it.
@@ -68,6 +68,6 @@ def awaits_coroutines(executor: Executor | None) -> bool:
 
 
 def parameter_overrides(node: Node) -> dict[str, Parameter]:
-    """Return the parameters given at the start, declared or not; none where they are not known."""
+    """Return the parameters given at the start, declared or not; empty if unknown."""
     overrides: dict[str, Parameter] = getattr(node, "_parameter_overrides", {})
     return overrides

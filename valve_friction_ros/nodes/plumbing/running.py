@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Starting and stopping nodes as a process, which ends also where its loop is stuck."""
+"""Start and stop of nodes as a process, which ends even if its loop is stuck."""
 
 import contextlib
 import faulthandler
@@ -35,11 +35,11 @@ from valve_friction_ros.nodes.plumbing.worker import Companion, workers_have_end
 
 
 def notify(state: str) -> None:
-    """Send a state such as ``READY=1``; nothing happens where nobody listens."""
+    """Send a state such as ``READY=1`` to systemd, if it listens."""
     address = os.environ.get("NOTIFY_SOCKET", "")
     if not address:
         return
-    if address.startswith("@"):  # a name without a file
+    if address.startswith("@"):  # abstract socket
         address = "\0" + address[1:]
     with contextlib.suppress(OSError), socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as sender:
         sender.setblocking(False)
@@ -47,7 +47,7 @@ def notify(state: str) -> None:
 
 
 def _watchdog_time() -> float | None:
-    """Return the time without ``WATCHDOG=1`` after which systemd acts, s; None if it does not."""
+    """Return the time without ``WATCHDOG=1`` after which systemd acts, s, or None."""
     with contextlib.suppress(KeyError, ValueError):
         if int(os.environ.get("WATCHDOG_PID", os.getpid())) == os.getpid():
             return int(os.environ["WATCHDOG_USEC"]) / 1e6
@@ -55,26 +55,25 @@ def _watchdog_time() -> float | None:
 
 
 LOOP_LIMIT = 10.0
-"""Time, s, after which a loop that has not turned counts as stuck."""
+"""Time without a turn, s, after which a loop is considered stuck."""
 _LOOK = 0.5
-"""Time between two looks, s; they are counted, so that a process that was stopped is not stuck."""
+"""Time between two checks, s. Time is measured in checks, so a suspended process is not stuck."""
 _REPEAT = 1.0
 """Time between two messages, s."""
 
 
 class _Watchdog(Companion):
-    """Watches the loop of some nodes from a thread of its own, as long as the context lasts.
+    """Watches the loop of some nodes from its own thread, as long as the context lasts.
 
-    systemd's watchdog is served as long as the loop turns and no node has overdue work. When the
-    loop has not turned for `LOOP_LIMIT`, the stacks of all threads are written to stderr once, and
-    what each node says in that case is published on ``/diagnostics`` every second, in the loop's
-    stead.
+    It serves systemd's watchdog as long as the loop turns and no node has overdue work. When the
+    loop has not turned for `LOOP_LIMIT`, it writes the stacks of all threads to stderr once, and
+    publishes the `stuck_status` of each node on ``/diagnostics`` every second in place of the loop.
     """
 
     def __init__(self, nodes: Sequence[PolledNode]) -> None:
         super().__init__("watchdog")
         self._nodes = nodes
-        # Made in time: a loop that is stuck may hold what the making of a publisher needs.
+        # Created early: a stuck loop may hold locks that the creation of a publisher needs.
         self._publisher: Publisher | None = None
         if any(node.stuck_status("") for node in nodes):
             self._publisher = nodes[0].create_publisher(DiagnosticArray, "/diagnostics", 10)
@@ -87,7 +86,7 @@ class _Watchdog(Companion):
 
     def end(self) -> None:
         notify("STOPPING=1")
-        self.thread.join(1.0)  # it may be within the middleware, which is to be shut down
+        self.thread.join(1.0)  # it may be inside the middleware, which will be shut down
 
     def turned(self) -> None:
         self._turns += 1
@@ -102,7 +101,7 @@ class _Watchdog(Companion):
             if not idle and all(node.overdue() is None for node in self._nodes):
                 notify("WATCHDOG=1")
             if idle >= allowed and (idle - allowed) % each == 0:
-                with contextlib.suppress(RuntimeError):  # the thread must live on
+                with contextlib.suppress(RuntimeError):  # the thread must survive
                     self._say(idle * self._look)
             if idle == allowed:
                 faulthandler.dump_traceback()
@@ -121,24 +120,24 @@ class _Watchdog(Companion):
 
 
 _LOOP_END = 60.0
-"""Time, s, after which a process ends whose loop has not turned. A process that was paused for
-longer ends when it goes on: the timer cannot tell one from the other."""
+"""Time without a turn of the loop, s, after which the process ends. A process that was suspended
+for longer ends when it resumes: the timer cannot distinguish the two."""
 _DUMP = 5.0
-"""Time, s, in which the stacks are written."""
+"""Time allowed for writing the stacks, s."""
 _ARM = 1.0
 _SILENCE = 10.0
-"""Time, s, without any input after which the middleware is asked whether it still works."""
+"""Time without any input, s, after which the middleware is tested."""
 _AGAIN, _RARELY = 30.0, 300.0
-"""Times between two such questions, s, while the inputs are silent, and while they are not: each
-question is told to all participants of the domain."""
+"""Times between two tests, s, while the inputs are silent and while they are not: each test is
+announced to all participants of the domain."""
 _ANSWER = 20.0
-"""Time, s, within which the middleware answers; it takes milliseconds."""
+"""Time limit for the middleware in a test, s; it usually takes milliseconds."""
 
 
 def arm(seconds: float = _LOOP_END) -> None:
-    """End the process after a time, unless it is armed again or disarmed before."""
+    """End the process after a time, unless rearmed or disarmed earlier."""
     faulthandler.dump_traceback_later(seconds, exit=True)
-    signal.setitimer(signal.ITIMER_REAL, seconds + _DUMP)  # its default is the end of the process
+    signal.setitimer(signal.ITIMER_REAL, seconds + _DUMP)  # by default it ends the process
 
 
 def _disarm() -> None:
@@ -149,13 +148,13 @@ def _disarm() -> None:
 class _Deadman:
     """Ends the process of some nodes when its loop or the middleware hangs.
 
-    Two things freeze a node for good, and no thread of Python can help in either. The loop may hang
-    in a library that holds Python's lock. And the middleware may lock itself up while clients come
-    and go (eProsima/Fast-DDS issue 6502): then nothing is received, answered or discovered any
-    more, and the loop turns. So a timer of C, that of ``faulthandler``, writes the stacks of all
-    threads to stderr and ends the process with exit code 1, and what started it can start it again.
-    Where nobody reads stderr any more, so that the stacks cannot be written, the system's alarm
-    signal ends it 5 s later.
+    Two faults freeze a node permanently, and no Python thread can help in either case. The loop may
+    hang in a library that holds Python's lock. The middleware may deadlock while clients come and
+    go (eProsima/Fast-DDS issue 6502): the loop still turns, but nothing is received, answered or
+    discovered any more. Therefore a C timer, that of ``faulthandler``, writes the stacks of all
+    threads to stderr and ends the process with exit code 1, so that its supervisor can restart it.
+    If nobody reads stderr any more and the stacks cannot be written, the alarm signal of the system
+    ends the process 5 s later.
     """
 
     def __init__(self, nodes: Sequence[PolledNode]) -> None:
@@ -170,7 +169,7 @@ class _Deadman:
             arm()
 
     def turned(self) -> None:
-        """Note that the loop has turned; ask the middleware now and then."""
+        """Record a turn of the loop; test the middleware from time to time."""
         self.goes_on()
         now = time.monotonic()
         heard = max((node.last_heard for node in self._nodes), default=now)
@@ -180,9 +179,9 @@ class _Deadman:
             self._end_if_the_middleware_hangs()
 
     def _end_if_the_middleware_hangs(self) -> None:
-        """Make a publisher, which takes the lock of the discovery, and destroy it.
+        """Create and destroy a publisher, which takes the lock of the discovery.
 
-        A middleware that hangs never returns from this, and rclpy holds Python's lock meanwhile.
+        A hung middleware never returns from this call, during which rclpy holds Python's lock.
         """
         arm(_ANSWER)
         node = next(self._next)
@@ -192,45 +191,45 @@ class _Deadman:
 
 _PAUSE = 0.1
 _LIVELY_PAUSE = 0.02
-"""Times between two turns, s: while nothing is asked, and while services are in use. For so long
-messages gather, and a first request waits."""
+"""Times between two turns, s: without requests, and while services are in use. During this time
+messages accumulate, and a first request waits."""
 _LIVELY_TIME = 2.0
-"""Time, s, for which services count as in use after the start and after each answer."""
+"""Time, s, for which services are considered in use after the start and after each answer."""
 _LONGEST_WAIT = 0.2
-"""Time, s, for which the nodes of a process work before its services are looked at again. Hundreds
-of valves that move at once have work for seconds."""
+"""Time, s, for which the nodes of a process work before its services are checked again. Hundreds of
+valves that move at once cause seconds of work."""
 _SWITCH = 5e-4
-"""Time, s, after which a thread that computes lets the turns go on. Python's 5 ms are lost at each
-message while an identification runs: seconds for hundreds of valves."""
+"""Time, s, after which a computing thread yields to the turns. Python's default of 5 ms would be
+lost at each message during an identification: seconds for hundreds of valves."""
 _PAUSE_OF_A_NODE = 1e-3
-"""Time, s, by which each node of a process lengthens the pause: ten times what its turn costs, so
-that a hundred nodes without any messages take a tenth of a core."""
+"""Time, s, by which each node of a process lengthens the pause: ten times the cost of its turn, so
+that a hundred nodes without messages take a tenth of a core."""
 _CLEAN_UP = 2.7
-"""Time, s, that is left to the clean-up."""
+"""Time allowed for the clean-up, s."""
 _WORKERS_PATIENCE = 2.0
-"""Time, s, that the end of the process leaves to what is being written."""
+"""Time that the end of the process allows for files being written, s."""
 
 _PATIENCE = 2.5
-"""Time, s, from the request to the end of the process at the latest."""
+"""Longest time from the request to the end of the process, s."""
 _REQUESTS = (signal.SIGINT, signal.SIGTERM)
 
 
 class StopRequest(Companion):
-    """Whether Ctrl-C or SIGTERM has come, as long as the context lasts.
+    """Records Ctrl-C or SIGTERM, as long as the context lasts.
 
-    A handler that raised could strike within rclpy's own code, and rclpy's own handler shuts the
-    context down under a callback that is still publishing. So the request is only noted.
+    A handler that raises could interrupt rclpy's own code, and rclpy's own handler shuts down the
+    context under a callback that is still publishing. Therefore the request is only recorded.
 
-    A loop that is stuck in foreign code never runs Python's handlers. Python writes each signal
-    into a socket even then, and a thread that reads there ends the process, if the context has not
-    ended by itself 2.5 s later.
+    A loop that is stuck in foreign code never runs Python's handlers. Even then Python writes each
+    signal to a socket. A thread that reads this socket ends the process if the context has not
+    ended by itself after 2.5 s.
 
     Attributes
     ----------
     has_come : bool
-        Whether the loop shall end.
+        Whether the loop must end.
     is_followed : bool
-        Set by the loop when it has ended, and only the clean-up is left.
+        Set by the loop when it has ended and only the clean-up is left.
     """
 
     def __init__(self) -> None:
@@ -240,21 +239,21 @@ class StopRequest(Companion):
         self._writer.setblocking(False)
 
     def begin(self) -> None:
-        """Take the signals."""
+        """Install the signal handlers."""
         for request in _REQUESTS:
             signal.signal(request, self._note)
         self._before = signal.set_wakeup_fd(self._writer.fileno(), warn_on_full_buffer=False)
 
     def end(self) -> None:
-        """Give the signals back."""
+        """Restore the signal handlers."""
         signal.set_wakeup_fd(self._before)
-        self._writer.close()  # ends the thread, if no request has come
+        self._writer.close()  # ends the thread if there was no request
 
     def _note(self, *_: object) -> None:
         self.has_come = True
 
     def run(self) -> None:
-        """Wait for a request, then for the end."""
+        """Wait for a request, then for the end of the context."""
         while number := self._reader.recv(1):
             if number[0] in _REQUESTS:
                 break
@@ -268,13 +267,13 @@ class StopRequest(Companion):
 
 
 WRONG_REQUESTS = (NameValidationException, ParameterException, RuntimeError, ValueError)
-"""What rclpy and the nodes raise where arguments, parameters or quality of service are wrong."""
+"""Exceptions of rclpy and the nodes for wrong arguments, parameters or quality of service."""
 
 
 def cannot_start(error: Exception) -> int:
-    """Write what was wrong in one line, and return the exit code."""
+    """Write the problem in one line, and return the exit code."""
     cause = " ".join(str(error).split())
-    if "log directory" in cause or "logging directory" in cause:  # rcl's words
+    if "log directory" in cause or "logging directory" in cause:  # messages of rcl
         cause += ": set ROS_LOG_DIR to a writable folder"
     print(f"cannot start: {cause}", file=sys.stderr)  # noqa: T201
     return 2
@@ -289,7 +288,7 @@ def _run(
 ) -> None:
 
     def answered(looked: float) -> float:
-        """Look at the services also within a turn, where it lasts; return when that was last."""
+        """Check the services during a long turn too; return the time of the last check."""
         if time.monotonic() <= looked + _LONGEST_WAIT:
             return looked
         for executor in executors:
@@ -307,7 +306,7 @@ def _run(
         for node in nodes:
             node.poll_guarded()
             looked = answered(looked)
-            # Where hundreds of nodes get little of a core, their whole turn may last long.
+            # The whole turn may be long if hundreds of nodes share a slow core.
             watchdog.turned()
             deadman.goes_on()
             if _is_over(stop):
@@ -324,19 +323,19 @@ def _is_over(stop: StopRequest) -> bool:
 
 
 def join_graph(arguments: Sequence[str] | None, context: Context | None = None) -> None:
-    """Make the process a participant of the ROS graph, or one more for another context."""
+    """Create a participant of the ROS graph for the process or for a further context."""
     rclpy.init(args=arguments, context=context, signal_handler_options=SignalHandlerOptions.NO)
 
 
 def run_nodes(create: Callable[[], Iterable[Node]], arguments: Sequence[str] | None = None) -> int:
     """Run nodes in one process until Ctrl-C, SIGTERM or shutdown; return the exit code.
 
-    It is 0 after a clean stop, and 2 if arguments or parameters do not let the nodes start: what
-    they or rclpy refuse is written to stderr in one line. The ROS arguments are those of the
-    process by default.
+    The exit code is 0 after a clean stop. It is 2 if arguments or parameters prevent the start; the
+    cause is then written to stderr in one line. The ROS arguments are by default those of the
+    process.
 
-    Where a worker is still busy at the end, the process ends here, without it. Where the loop or
-    the middleware hangs for good, the process ends with exit code 1.
+    If a worker is still busy at the end, the process ends here without waiting for it. If the loop
+    or the middleware hangs permanently, the process ends with exit code 1.
     """
     sys.setswitchinterval(_SWITCH)
     with StopRequest() as stop:
@@ -347,7 +346,7 @@ def run_nodes(create: Callable[[], Iterable[Node]], arguments: Sequence[str] | N
             exit_code = 1
         have_ended = workers_have_ended(_WORKERS_PATIENCE)
     if not have_ended:
-        # Python would wait for them, for a compilation or an identification of minutes.
+        # Python would wait for them, possibly for minutes of compilation or identification.
         sys.stdout.flush()
         sys.stderr.flush()
         os._exit(exit_code)
@@ -368,7 +367,7 @@ def _run_until(
     try:
         try:
             for node in create():
-                nodes.append(node)  # those before a refused one are destroyed too
+                nodes.append(node)  # so that nodes before a refused one are destroyed too
                 arm()
                 if stop.has_come:
                     return 0
@@ -394,12 +393,13 @@ def _run_until(
 def _close(nodes: Sequence[Node], executors: Mapping[Context, TurnExecutor]) -> None:
     """Destroy the nodes and leave the graph.
 
-    All write first: the middleware takes more time for hundreds of nodes than is left to the end.
+    All nodes write their data first: for hundreds of nodes the middleware takes longer than the
+    time allowed for the end.
     """
     for node in nodes:
         if isinstance(node, PolledNode):
             node.finish()
-    # An executor that still holds the node's entities would keep them alive.
+    # An executor that still refers to entities of a node would keep them alive.
     for executor in executors.values():
         executor.shutdown()
     for node in nodes:

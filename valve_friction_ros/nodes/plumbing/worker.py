@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Threads for work that takes its time: when they are ready, how long it lasts, how it ends."""
+"""Threads for long-running work: preparation, duration and end."""
 
 import contextlib
 import threading
@@ -31,7 +31,7 @@ _Result = TypeVar("_Result")
 
 
 class InternalError(Exception):
-    """A bug of this package, in one line for the caller; its traceback is in the log."""
+    """A bug in this package, in one line for the caller; the log has its traceback."""
 
 
 def _internal_error(bug: Exception) -> InternalError:
@@ -51,11 +51,11 @@ def _internal_error(bug: Exception) -> InternalError:
 def bugs_reported(
     node: Node, *expected: type[Exception], known: str | None = None
 ) -> Iterator[None]:
-    """Turn a bug into an InternalError, and log its traceback.
+    """Convert a bug to an InternalError, and log its traceback.
 
-    An exception that leaves a callback would end the node, with all valves of its process.
-    RefusalError and the `expected` exceptions are no bugs, and pass unchanged. An internal error
-    that is `known`, in the log already, is not logged again.
+    An uncaught exception in a callback would end the node and all valves of its process.
+    RefusalError and the `expected` exceptions are not bugs and pass unchanged. An internal error
+    equal to `known`, which is already in the log, is not logged again.
     """
     passed: tuple[type[Exception], ...] = (RefusalError, InternalError, *expected)
     try:
@@ -75,10 +75,10 @@ async def done_in(
     *arguments: _Arguments.args,
     **named: _Arguments.kwargs,
 ) -> _Result:
-    """Do some work in a thread of `pool`, while the executor goes on.
+    """Run `work` in a thread of `pool` while the executor continues.
 
-    For callbacks that are coroutines, in a callback group that lets others run meanwhile. Returns
-    what the work returns, and raises what it raises, in the executor's thread.
+    It is for coroutine callbacks in a callback group that lets others run meanwhile. It returns the
+    result of `work`, or raises its exception, in the thread of the executor.
     """
     finished = Awaited()
     pool.submit(work, *arguments, **named).add_done_callback(finished.set_result)
@@ -92,16 +92,16 @@ _PAUSE = 0.02
 
 
 class Worker(ThreadPoolExecutor):
-    """A thread that does one thing after the other, or some threads that share what is to be done.
+    """A thread that runs jobs in order, or several threads that share the jobs.
 
     Parameters
     ----------
     name : str
         Name of the thread.
     prepare : callable, optional
-        What is done first, while all threads wait.
+        The first job; all threads wait for it.
     finishes : bool
-        Whether the end of the process waits a little for what has been submitted.
+        Whether the end of the process waits a little for the submitted jobs.
     threads : int
         Number of threads.
     """
@@ -131,7 +131,7 @@ class Worker(ThreadPoolExecutor):
         *arguments: _Arguments.args,
         **named: _Arguments.kwargs,
     ) -> Future[_Result]:
-        """Do some work when all that was submitted before is done, or begun by other threads."""
+        """Run `work` once all earlier jobs are done, or started by other threads."""
 
         def timed() -> _Result:
             self._begun[threading.get_ident()] = time.monotonic()
@@ -147,26 +147,26 @@ class Worker(ThreadPoolExecutor):
 
     @property
     def is_busy(self) -> bool:
-        """Whether something is being done, or waits to be."""
+        """Whether a job is running or waiting."""
         return bool(self._unfinished)
 
     @property
     def is_preparing(self) -> bool:
-        """Whether what is done first is not done yet."""
+        """Whether the preparation has not yet finished."""
         return self._preparation is not None and not self._preparation.done()
 
     def busy_for(self) -> float:
-        """Return how long the longest work under way has lasted, s; 0 if there is none."""
+        """Return the time for which the oldest running job has been running, s, or 0."""
         begun = [*self._begun.values()]
         return time.monotonic() - min(begun) if begun else 0.0
 
 
 _QUICK = 5.0
-"""Time, s, of a preparation that is not worth a line."""
+"""Longest preparation that is not logged, s."""
 
 
 class Readiness:
-    """Tells whether a worker has prepared what a node needs; logs `ready` once it has."""
+    """Monitors the preparation of a node by a worker; logs `ready` when it is finished."""
 
     def __init__(self, node: Node, worker: Worker, ready: str) -> None:
         self._node = node
@@ -177,7 +177,7 @@ class Readiness:
 
     @property
     def problem(self) -> str | None:
-        """That the node is preparing; None once it is ready."""
+        """Message that the node is preparing; None once it is ready."""
         if not self._worker.is_preparing:
             return None
         if kernels_are_cached():
@@ -189,7 +189,7 @@ class Readiness:
 
     @property
     def is_slow(self) -> bool:
-        """Whether the preparation is worth a line: it lasts longer than loading does."""
+        """Whether the preparation takes longer than mere loading, so that it is logged."""
         return self.problem is not None and time.monotonic() > self._tell_at
 
     def values(self) -> dict[str, str]:
@@ -197,7 +197,7 @@ class Readiness:
         return {} if self.problem is None else {"preparing": self.problem}
 
     def look(self) -> bool:
-        """Return whether the node is ready; log what has not been logged."""
+        """Return whether the node is ready; log a slow preparation and its end."""
         if self._is_ready:
             return True
         problem, log = self.problem, self._node.get_logger()
@@ -211,7 +211,7 @@ class Readiness:
 
 
 class Companion:
-    """A daemon thread that runs as long as the context lasts; the end does not wait for it.
+    """A daemon thread that runs as long as the context lasts; the exit does not wait for it.
 
     Parameters
     ----------
@@ -223,7 +223,7 @@ class Companion:
     has_ended : threading.Event
         Whether the context has ended.
     thread : threading.Thread
-        What runs.
+        The thread.
     """
 
     def __init__(self, name: str) -> None:
@@ -240,21 +240,21 @@ class Companion:
         self.end()
 
     def begin(self) -> None:
-        """Do what comes first."""
+        """Set up before the thread starts."""
 
     def run(self) -> None:
         """Do the work of the thread."""
         raise NotImplementedError
 
     def end(self) -> None:
-        """Do what comes last."""
+        """Clean up when the context ends."""
 
 
 _workers: WeakSet[Worker] = WeakSet()
 
 
 def workers_have_ended(patience: float) -> bool:
-    """Let the workers that finish their work do so for `patience` seconds; tell if none is busy."""
+    """Wait up to `patience` s for workers that finish their jobs; return whether none is busy."""
     deadline = time.monotonic() + patience
     while any(one.finishes and one.is_busy for one in _workers) and time.monotonic() < deadline:
         time.sleep(_PAUSE)
