@@ -7,4 +7,4 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The node that identifies a valve and watches its friction."""
+"""The node that identifies a valve and monitors its friction."""

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The executable `identifier`, as ``python -m valve_friction_ros.nodes.identifier`` runs it."""
+"""Run the executable `identifier` as ``python -m valve_friction_ros.nodes.identifier``."""
 
 import sys
 

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The alarms of a valve: followed, kept in the history, and moved on by requests of people."""
+"""The alarms of a valve: conditions, storage in the history, and requests by people."""
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
@@ -49,16 +49,16 @@ if TYPE_CHECKING:
     from valve_friction_ros.history import AlarmSteps, HistoryFile
 
 _RISE, _FALL = 15.0, 60.0
-"""Times, s, for which samples must be unusable, or usable again. Chosen, within the delays of 15 to
-60 s that ISA-18.2 proposes to begin with."""
+"""On-delay and off-delay of the alarm on unusable samples, s. Chosen within the initial delays of
+15 to 60 s proposed by ISA-18.2."""
 _SETTLE = 600.0
-"""Time, s, for which what moves show must be gone. Chosen: a loop makes some moves within it."""
+"""Off-delay of conditions shown by moves, s. Chosen: a loop makes some moves within it."""
 
 _ASKED = ("alarm_kind", "alarm_who", "alarm_text", "alarm_hours")
 
 
 class _Step:
-    """A change of the history that says what it has made of the alarms, once it is made."""
+    """A change of the history that records its effect on the alarms once it is made."""
 
     def __init__(self, make: Callable[["HistoryFile"], "AlarmSteps"]) -> None:
         self._make = make
@@ -73,7 +73,7 @@ class _Step:
 
 
 class AlarmBoard:
-    """Follows the alarms of a valve, and offers the services by which people move them on.
+    """Follows the alarms of a valve, and offers the services for people to handle them.
 
     The alarms are those of the history; without one, or while it cannot be written, those of this
     run.
@@ -108,7 +108,7 @@ class AlarmBoard:
         self.is_requested = False
         self._under_way: _Step | None = None
         if not node.tells_parameters:
-            return  # who asks is a parameter
+            return  # a request needs the parameter alarm_who
         for name, action in (
             ("acknowledge", AlarmAction.ACKNOWLEDGE),
             ("shelve", AlarmAction.SHELVE),
@@ -120,13 +120,13 @@ class AlarmBoard:
 
     @property
     def alarms(self) -> Mapping[AlarmKind, Alarm]:
-        """The alarms by kind; one that was never raised is not there."""
+        """The alarms by kind, without those never raised."""
         return self._alarms
 
     def _condition(self, kind: AlarmKind) -> Condition:
         return self._alarms[kind].condition if kind in self._alarms else NO_CONDITION
 
-    # What the valve shows
+    # Conditions of the valve
 
     def follow(
         self,
@@ -135,13 +135,13 @@ class AlarmBoard:
         renewal: int,
         now: float,
     ) -> None:
-        """Follow what the valve shows: findings by kind, and faults of its data.
+        """Update the alarms from the findings by kind and the faults of the data.
 
-        `renewal` is when its packing was renewed, ns; `now` is s of a clock that does not go back.
+        `renewal` is the time at which the packing was renewed, ns; `now` is s of a monotonic clock.
         """
         self._settle()
         time = self._node.get_clock().now().nanoseconds
-        if not time:  # simulated time has not begun
+        if not time:  # simulated time has not started
             return
         conditions = {
             **self._frictions(renewal),
@@ -179,7 +179,7 @@ class AlarmBoard:
             )
 
     def _settle(self) -> None:
-        """Take the alarms of the history once what was written is there: others may write, too."""
+        """Adopt the alarms of the history once our change is written: others write there too."""
         step = self._under_way
         if step is not None and step.made is not None:
             self._alarms = dict(step.made.alarms)
@@ -188,7 +188,7 @@ class AlarmBoard:
             self._alarms |= self._history.alarm_news()
 
     def _frictions(self, renewal: int) -> dict[AlarmKind, Condition]:
-        """Look at the friction where there is something new: an identification, or moves."""
+        """Update the friction conditions after a new identification or new moves."""
         monitor, evidence = self._monitor, self._evidence.evidence
         limits = monitor.settings.limits
         before, self._hold = self._hold, self._hold.based_on((monitor.baseline, limits, renewal))
@@ -211,19 +211,19 @@ class AlarmBoard:
         return {kind: self._hold.conditions[side] for side, kind in ALARM_OF_SIDE.items()}
 
     def _whole_valve(self, findings: Sequence[Finding]) -> Condition:
-        """Return what has changed beside the friction; it ends where nothing may have changed."""
+        """Return the condition beyond friction; it falls only if nothing can have changed."""
         worst, before = shown_by(findings), self._condition(AlarmKind.WHOLE_VALVE)
         if worst.level >= before.level or not self._monitor.may_have_changed():
             return worst
         return before
 
-    # What people ask
+    # Requests by people
 
     async def _switch(self, request: Any) -> str:
         return await self._ask(AlarmAction.TAKE_OUT if request.data else AlarmAction.PUT_BACK)
 
     async def _ask(self, action: AlarmAction) -> str:
-        """Make what the parameters ask for; they hold for one request."""
+        """Carry out the request in the parameters, which apply to one request."""
         values = {name: self._node.get_parameter(name).value for name in _ASKED}
         kind = None if values["alarm_kind"] == "all" else AlarmKind(values["alarm_kind"])
         self._forget()
@@ -247,16 +247,16 @@ class AlarmBoard:
             await self._history.keep_step(step)
         if step.refusal is not None:
             raise step.refusal
-        if step.made is None:  # nothing is kept, or not yet
+        if step.made is None:  # not stored, or not yet
             events = all_requested(self._alarms, kind, request, time)
         else:
             events, self._alarms = step.made.events, dict(step.made.alarms)
-            self._under_way = None  # it was made before
+            self._under_way = None  # it was made earlier
         self._take(events)
         return "; ".join(str(one.alarm) for one in events) + self._history.reservation
 
-    # What the graph shows
+    # Diagnostics
 
     def values(self) -> dict[str, str]:
-        """Return the state of each alarm, and what is known of those that are not normal."""
+        """Return the state of each alarm, with details of those that are not normal."""
         return alarm_values(self._alarms)

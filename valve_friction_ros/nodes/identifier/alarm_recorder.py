@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""A bag, and the page of the report, of the time before and after a rise of the level."""
+"""A bag and a report page for the time before and after a rise of the level."""
 
 import contextlib
 import re
@@ -33,14 +33,14 @@ from valve_friction_ros.records.bags.topics import StreamNames
 from valve_friction_ros.streams import Samples, Snapshot, nanoseconds, utc, utc_second
 
 PAGE = "report.html"
-"""The page of the report, in the folder of the bag."""
+"""File name of the report page, in the folder of the bag."""
 
 _DESCRIPTION = "metadata.yaml"
-"""The file that makes a folder a bag."""
+"""The file that marks a folder as a bag."""
 _BESIDE = re.compile(rf"valve\.yaml|(\.\d+_)?{re.escape(PAGE)}")
-"""Files beside the bag, and the draft of a page."""
+"""Files next to the bag, including the draft of a page."""
 _STALE = 86_400.0
-"""Age, s, from which an unfinished bag is what a killed node has left."""
+"""Age, s, from which an unfinished bag is considered a leftover of a killed node."""
 
 
 def _recording_name(valve: str, stamp: int, level: Level) -> str:
@@ -53,9 +53,10 @@ def _size_of(recording: Path) -> int:
 
 
 def _remove_recording(recording: Path) -> None:
-    """Remove the files of a recording, and its folder if nothing else is in it.
+    """Remove the files of a recording, and its folder if it is then empty.
 
-    What makes it a recording goes last: a node killed meanwhile leaves one, to be removed later.
+    The file that marks the recording goes last: if the node is killed meanwhile, the rest is still
+    a recording and can be removed later.
     """
     for one in sorted(recording.iterdir(), key=lambda one: one.name == _DESCRIPTION):
         if _is_written(one):
@@ -66,14 +67,14 @@ def _remove_recording(recording: Path) -> None:
 def remove_oldest(
     folder: Path, valve: str, most: int, most_bytes: float, new: Path | None = None
 ) -> None:
-    """Remove the oldest recordings of a valve until few enough, and small enough, are left.
+    """Remove the oldest recordings of a valve until both limits are met.
 
-    Of recordings of one level in a row the first goes last: it shows how the trouble began, the
-    others a level that flaps.
+    Of successive recordings at one level the first is removed last: it shows how the trouble
+    began, while the others show a fluctuating level.
 
-    Only folders by the name of such a recording count that hold the files of one and no others. The
-    `new` one counts and stays. What a killed node has left of this valve goes after a day. Raises
-    OSError if something cannot be removed.
+    Only folders that are named like such a recording and contain nothing else are considered. The
+    `new` recording is included in the limits but never removed. Leftovers of a killed node for this
+    valve are removed after a day. Raises OSError if something cannot be removed.
     """
     pattern = re.compile(rf"alarm_{re.escape(valve)}_(\d{{8}}T\d{{6}}Z)_(WARN|ERROR)(?:_(\d+))?")
     found: dict[Path, tuple[str, int, str]] = {}
@@ -93,7 +94,7 @@ def remove_oldest(
 
 
 def _useless_first(found: Mapping[Path, tuple[str, int, str]]) -> list[Path]:
-    """Sort recordings by age, and put the first of each level in a row behind the others."""
+    """Sort recordings by age, with the first of each run at one level after all others."""
     firsts: list[Path] = []
     others: list[Path] = []
     before = ""
@@ -111,31 +112,31 @@ def _folders(folder: Path) -> Iterator[Path]:
 
 
 def _is_recording(place: Path) -> bool:
-    """Return whether a folder holds a recording and nothing else, or nothing at all."""
+    """Return whether a folder contains only a recording, or nothing."""
     files = list(place.iterdir())
     is_bag = any(one.name == _DESCRIPTION for one in files)
     return all(map(_is_written, files)) and (is_bag or not files)
 
 
 def _is_written(file: Path) -> bool:
-    """Return whether the node writes a file of this name into its folder."""
-    name, folder = file.name, re.sub(r"_\d+$", "", file.parent.name)  # without a second's number
+    """Return whether the node writes files of this name into this folder."""
+    name, folder = file.name, re.sub(r"_\d+$", "", file.parent.name)  # without its running number
     return name in (_DESCRIPTION, f"{folder}.mcap") or _BESIDE.fullmatch(name) is not None
 
 
 def _is_left(workplace: Path, pattern: re.Pattern[str]) -> bool:
-    """Return whether a killed node has left an unfinished bag by such a name there."""
+    """Return whether a folder is the leftover of a killed node: an old unfinished bag."""
     names = [one.name for one in workplace.iterdir()]
     is_old = time.time() - workplace.stat().st_mtime > _STALE
     return is_old and len(names) == 1 and pattern.fullmatch(names[0]) is not None
 
 
 _LATE = 1.0
-"""Time, s, for which samples may be late before a recording ends without them."""
+"""Time, s, that a recording waits for late samples."""
 
 
 class _Rise(NamedTuple):
-    """A rise of the level: the level, when, what was said, the buffer of that time, its bag."""
+    """A rise of the level: level, time, message, buffer at that time and its bag."""
 
     level: Level
     time: int
@@ -147,15 +148,15 @@ class _Rise(NamedTuple):
 
 
 class AlarmRecorder:
-    """Saves the buffer from before and after a rise of the level, one at a time.
+    """Saves the buffer from before and after a rise of the level, one rise at a time.
 
-    What was before is saved at once, so that it outlives a killed node; the bag with what came
-    after takes its place.
+    The samples before the rise are saved at once, so that they survive if the node is killed. A bag
+    that includes the samples after the rise replaces them.
 
-    The level is that of what samples can show: silent inputs, a history that cannot be written and
-    the life of a packing do not count. The level at the start is none that has risen. After a rise,
-    others are recorded for a pause only if they reach a higher level, so that a level that flaps
-    fills no disk. The worker writes; the executor's thread looks for the outcome once a second.
+    The level includes only what samples can show, and not silent inputs, a history that cannot be
+    written or the life of a packing. The level at the start is not a rise. For a pause after a rise
+    only higher levels are recorded, so that a fluctuating level does not fill the disk. The worker
+    writes; the executor's thread checks the outcome once a second.
     """
 
     def __init__(
@@ -180,7 +181,7 @@ class AlarmRecorder:
         self._problem: str | None = None
 
     def follow(self, level: Level, message: str, names: StreamNames) -> None:
-        """Follow what is found on the valve; begin and end recordings."""
+        """Follow the level of the valve; start and end recordings."""
         before, self._level = self._level, level
         self._settle()
         if before is not None and level > before:
@@ -193,7 +194,7 @@ class AlarmRecorder:
             self._rise = None
 
     def values(self) -> dict[str, str]:
-        """Return the latest recording, and what hindered one since."""
+        """Return the latest recording, and the cause of any failure since."""
         values: dict[str, str] = {}
         if self._latest is not None:
             values["alarm_recording"] = str(self._latest.path)
@@ -225,7 +226,7 @@ class AlarmRecorder:
         self._last_rise = level, now
 
     def _is_over(self, rise: _Rise) -> bool:
-        """Whether the time after a rise is over: by the stamps, or else by the machine's clock."""
+        """Return whether the time after a rise is over, by the stamps or else by the clock."""
         after = min(self._parameter("alarm_recording"), self._monitor.settings.window)
         before, newest = rise.newest, self._monitor.buffer.newest_stamp
         if before is not None and newest is not None and newest - before >= nanoseconds(after):
@@ -239,7 +240,7 @@ class AlarmRecorder:
         names: StreamNames,
         first: Future[AlarmRecording] | None = None,
     ) -> Future[AlarmRecording]:
-        """Have the worker write a bag, which takes the place of the first one of the rise."""
+        """Write a bag in the worker; it replaces the first bag of the rise."""
         node = self._node
         most, room = self._bounds()
         valve = valve_name(node)
@@ -247,7 +248,7 @@ class AlarmRecorder:
         write = bag_writer(node, self._monitor.settings.valve, names)
 
         def write_bag() -> AlarmRecording:
-            # The worker has done it: it does one thing after the other.
+            # The worker runs its jobs in order, so the first bag is done.
             before = None if first is None or first.exception() else first.result().path
             with self._folder.opened() as folder:
                 remove_oldest(folder, valve, most - (before is None), room, new=before)
@@ -265,16 +266,16 @@ class AlarmRecorder:
         return self._worker.submit(write_bag)
 
     def _write_page(self, path: Path) -> None:
-        """Write the page into the folder of the bag; it may take its time, and the bag is there."""
+        """Write the page into the folder of the bag; this is slow, so the bag is written first."""
         try:
             write = self._reports.of_now()
         except RefusalError:
-            return  # an alarm from before a restart has no result
+            return  # after a restart there is an alarm without a result
         valve, (most, room), page = valve_name(self._node), self._bounds(), path / PAGE
 
         def write_page() -> str | None:
             try:
-                if page.is_symlink():  # it would be followed
+                if page.is_symlink():  # writing would follow the link
                     page.unlink()
                 write(page)
                 if _size_of(path) > room:
@@ -288,7 +289,7 @@ class AlarmRecorder:
         self._page = self._worker.submit(write_page)
 
     def _bounds(self) -> tuple[int, float]:
-        """Return how many recordings stay, and their room, bytes."""
+        """Return the largest number of recordings, and their disk space, bytes."""
         most = int(self._parameter("alarm_recordings"))
         return most, 1e6 * self._parameter("alarm_megabytes")
 
@@ -331,7 +332,7 @@ class AlarmRecorder:
 
 
 def _joined(before: Snapshot, after: Snapshot) -> Snapshot:
-    """Join two copies of a buffer; what came after a jump back of the clock is left out."""
+    """Join two copies of a buffer; samples after a jump back of the clock are left out."""
     return after._replace(
         pressure=_following(before.pressure, after.pressure),
         position=_following(before.position, after.position),

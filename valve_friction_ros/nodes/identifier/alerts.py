@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Changes of a valve's level: logged once at each begin and end, and sent to a webhook."""
+"""Changes of the level of a valve: logged once at start and end, and sent to a webhook."""
 
 import math
 import time
@@ -32,25 +32,25 @@ from valve_friction_ros.nodes.identifier.workers import Workers
 from valve_friction_ros.wording import Statement, sentence
 
 _CALM = 10.0
-"""Time, s, without a fault after which it is logged as over. Chosen: one that comes and goes is
-one fault."""
+"""Time, s, without a fault after which it is logged as over. Chosen: an intermittent fault is one
+fault."""
 
 
 class LevelLog:
-    """Logs the level of a valve when it has changed; it begins at OK."""
+    """Logs changes of the level of a valve; the initial level is OK."""
 
     def __init__(self, node: Node) -> None:
         self._log = node.get_logger()
         self._level = Level.OK
 
     def follow(self, status: DiagnosticStatus) -> None:
-        """Log the level of a status, if it is not the one before."""
+        """Log the level of a status if it has changed."""
         level = Level(status.level[0])
         if level == self._level:
             return
         line = f"level {self._level.name} → {level.name}: {status.message}"
         self._level = level
-        # rclpy wants a severity to keep to its line of code.
+        # rclpy requires that a line of code always logs with the same severity.
         if level is Level.OK:
             self._log.info(line)
         elif level is Level.WARN:
@@ -60,9 +60,9 @@ class LevelLog:
 
 
 class FaultLog:
-    """Logs when a fault begins, and when it has been over for a while.
+    """Logs the start of a fault, and its end once it has been over for a while.
 
-    Times are those of a steady clock, s.
+    Times are s of a monotonic clock.
     """
 
     def __init__(self, node: Node) -> None:
@@ -72,7 +72,7 @@ class FaultLog:
         self._repeated: dict[Statement, int] = {}
 
     def follow(self, faults: Mapping[Statement, Statement], now: float) -> None:
-        """Take the faults of now: what is wrong, which does not change, and all of it."""
+        """Take the present faults: the fixed name of each, and its statement with figures."""
         for what, statement in faults.items():
             if what not in self._begun:
                 self._begun[what] = now
@@ -85,7 +85,7 @@ class FaultLog:
             self._log.info(f"ended after {lasted:.0f} s{times}: {what}")
 
     def note(self, what: Statement, statement: Statement, now: float) -> None:
-        """Take what happens at an instant; a repetition soon after it belongs to the same fault."""
+        """Take a momentary event; a repetition soon after it belongs to the same fault."""
         if what in self._begun:
             self._repeated[what] = self._repeated.get(what, 0) + 1
         self.follow({what: statement}, now)
@@ -95,9 +95,9 @@ _NE_107 = "NE 107"
 
 
 def webhook_from(url: str) -> Webhook | None:
-    """Return the webhook of the parameter's value, else of the environment; None for none.
+    """Return the webhook given by the parameter, else by the environment, or None.
 
-    Raises ValueError if its address, or the token in the environment, cannot be used.
+    Raises ValueError if its address, or the token in the environment, is invalid.
     """
     webhook = Webhook.at(url) if url else Webhook.from_environment()
     if webhook is not None:
@@ -106,12 +106,12 @@ def webhook_from(url: str) -> Webhook | None:
 
 
 class Alerts:
-    """Follows the diagnostics of a valve, posts each change of level, and says what went wrong.
+    """Follows the diagnostics of a valve, posts each change of level, and reports failures.
 
-    It begins with the level that the history says was told last: so a restart alone is no change,
-    and what waited when the process was killed is told. Without one it begins with `level`, that
-    of the valve at the start. After a restart `webhook_period` goes by first, in which inputs come
-    and levels settle.
+    It starts from the level last reported according to the history. A restart alone is therefore
+    not a change, and a change that was pending when the process was killed is reported. Without a
+    history it starts from `level`, that of the valve at the start. After a restart it first waits
+    for `webhook_period`, during which inputs arrive and levels settle.
     """
 
     def __init__(
@@ -145,13 +145,13 @@ class Alerts:
         alarms: Mapping[AlarmKind, Alarm],
         beside: Level = Level.OK,
     ) -> None:
-        """Post the level of a status if it has changed; then add to it what became of alerts.
+        """Post the level of a status if it has changed; then add the state of the alerts to it.
 
-        The level rests on the diagnosis of the friction, and on what else is found on the valve.
-        While an alarm is shelved, or out of service, the level is that of the other alarms, and of
-        what has none (`beside`): nobody is told again of what somebody has shelved.
+        The level follows from the diagnosis of friction and the other findings on the valve. While
+        an alarm is shelved or out of service, the level is that of the other alarms and of findings
+        without an alarm (`beside`), so that nobody is notified of a shelved alarm.
 
-        What is wrong with the alerts themselves raises the level afterwards, and is not posted.
+        Problems of the alerts themselves raise the level afterwards, and are not posted.
         """
         if self._webhook is None:
             return
@@ -172,7 +172,7 @@ class Alerts:
         self._mark(status, str(self._webhook))
 
     def _put_digest(self, alarms: Mapping[AlarmKind, Alarm]) -> None:
-        """Give the alarms to the digest; the first valve that finds it due posts it for all."""
+        """Pass the alarms to the digest; the first valve for which it is due posts it for all."""
         hour = self._node.get_parameter("webhook_digest").value
         valve = self._history.valve.tag, self._node.get_fully_qualified_name()
         letter = self._desk.hear(self._webhook, hour, valve, alarms, time.time())

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The baseline in force: parameter, services and history all set it here."""
+"""The baseline in force, set by the parameter, the services or the history."""
 
 import contextlib
 import math
@@ -39,7 +39,7 @@ _PARAMETER = "baseline_coulomb_friction"
 
 
 def baseline_from(value: float | None) -> Baseline | None:
-    """Build the baseline that its parameter gives; raises ValueError for an impossible one."""
+    """Build the baseline from its parameter; raises ValueError for an impossible value."""
     return None if value is None or math.isnan(value) else Baseline(value)
 
 
@@ -52,11 +52,11 @@ def _described_with_date(kept: KeptBaseline) -> str:
 
 
 class BaselineInForce:
-    """Puts a baseline in force: that of the parameter, of the services or of the history.
+    """Puts a baseline in force from the parameter, the services or the history.
 
-    The parameter shows F_c of the baseline in force, nan where that has only a sliding friction. A
-    parameter that is set to another value stands for an exact F_c, and no sliding friction; nan
-    leaves no baseline. `level` tells that of all that is found on the valve.
+    The parameter shows F_c of the baseline in force, or nan if it has only sliding friction. If the
+    parameter is changed, its value is an exact F_c without sliding friction; nan removes the
+    baseline. `level` returns the level of all findings on the valve.
     """
 
     def __init__(
@@ -77,7 +77,7 @@ class BaselineInForce:
         return baseline_from(self._node.get_parameter(_PARAMETER).value)
 
     def begin(self) -> None:
-        """Take the baseline of the parameter, or else of the history, and log which."""
+        """Take the baseline from the parameter, else from the history, and log its source."""
         kept = self._history.baseline
         self._monitor.baseline = self._given()
         given, log = self._monitor.baseline, self._node.get_logger()
@@ -91,11 +91,11 @@ class BaselineInForce:
             log.info(f"{_described_with_date(kept)}, from the history {self._history.path}")
 
     async def set(self) -> str:
-        """Take the newest sure friction as the baseline, and keep it; return the old and the new.
+        """Set and store the newest reliable friction as the baseline; return old and new baseline.
 
-        It is that of the latest result, or the sliding friction of the moves in service: where
-        those since the result could be a baseline by themselves, where there is no result, where
-        the latest identification was refused, or where the result cannot be a baseline. Raises
+        It is the friction of the latest result, or the sliding friction of the moves in service.
+        The moves are used if those since the result suffice for a baseline, if there is no result,
+        if the latest identification was refused, or if the result cannot be a baseline. Raises
         RefusalError in an alarm, or if neither can be a baseline.
         """
         baseline, by_evidence = await self._newest()
@@ -111,7 +111,7 @@ class BaselineInForce:
         )
 
     async def _newest(self) -> tuple[Baseline, bool]:
-        """Return what is healthy now, and whether it is of the moves in service."""
+        """Return the new baseline, and whether it is from the moves in service."""
         seen, is_refused = self._monitor.seen_until, self._monitor.refusal is not None
         if is_refused or (seen is not None and await self._evidence.outdates(seen)):
             with contextlib.suppress(RefusalError):
@@ -125,7 +125,7 @@ class BaselineInForce:
                 raise RefusalError(f"{refusal}; {of_moves}") from None
 
     async def restore(self) -> str:
-        """Put the baseline in force that the last ``~/set_baseline`` has replaced, and keep it.
+        """Restore and store the baseline that the last ``~/set_baseline`` has replaced.
 
         Raises RefusalError in an alarm, or if there is nothing to undo.
         """
@@ -143,9 +143,9 @@ class BaselineInForce:
         return await self._change(self._history.replaced_now(last, _RESTORE, self._level()))
 
     def values(self) -> dict[str, str]:
-        """Return whether `set` would set a baseline now, and what is missing to it, if not.
+        """Return whether `set` could now set a baseline, and if not, what is lacking.
 
-        A refused identification leaves the result before it, which may still serve.
+        After a refused identification the previous result may still serve.
         """
         lacks = self._monitor.baseline_lacks()
         if lacks and (of_moves := lack_of_moves(self._evidence.evidence)) is not None:
@@ -163,7 +163,7 @@ class BaselineInForce:
         return values
 
     def _forbidding(self) -> Diagnosis | Finding | None:
-        """Return the alarm in which no baseline may be set; None without one."""
+        """Return the alarm that forbids a new baseline, or None."""
         found: list[Diagnosis | Finding] = [
             self._monitor.diagnosis(),
             *self._monitor.findings,
@@ -199,10 +199,10 @@ class BaselineInForce:
         value = _value(baseline)
         shown = math.nan if value is None else value
         self._node.set_parameters([Parameter(_PARAMETER, value=shown)])
-        self._monitor.baseline = baseline  # after the node has followed the parameter
+        self._monitor.baseline = baseline  # after the node has processed the parameter
 
     def follow_parameter(self, changes: Iterable[Parameter]) -> None:
-        """Follow a change of the parameter, unless its value is in force already."""
+        """Follow a change of the parameter, unless its value is already in force."""
         if _PARAMETER not in {one.name for one in changes}:
             return
         given = self._given()

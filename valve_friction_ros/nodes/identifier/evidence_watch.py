@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The evidence of the moves in service: gathered, kept in the history, shown, and judged."""
+"""Evidence from the moves in service: collection, storage, display and diagnosis."""
 
 import math
 import time
@@ -58,19 +58,19 @@ if TYPE_CHECKING:
     from valve_friction_ros.history import HistoryFile
 
 _WRITE_EVERY = 5.0
-"""Time between two writings, s. A killed node loses so much, and a move that has not ended."""
+"""Time between two writes, s. If the node is killed, this time and an unfinished move are lost."""
 
 _TOLD = 3
-"""Moves in a row that are left out, from which it is a problem; one may have a stray stamp."""
+"""Number of successive moves left out that is a problem; a single move may have a stray stamp."""
 
 _SURE = 8
-"""Moves in a row that tell that the clock was ahead before. A clock that is not set yet after a
-start is set within less time."""
+"""Number of successive moves that prove that the clock was ahead before. A clock that is wrong
+after a start is set sooner than that."""
 
 
 @dataclass(eq=False)
 class _Batch:
-    """Moves to be written in the writer's thread, and whether they are."""
+    """Moves to write in the thread of the writer, and whether they are written."""
 
     valve: KeptValve
     built: Valve
@@ -84,9 +84,9 @@ class _Batch:
 
 
 class MoveLedger:
-    """Moves of one actuator and one packing, oldest first; what they said first; their change.
+    """Moves of one actuator and one packing, oldest first, with their reference and last change.
 
-    The last change of friction stays when the moves before it have gone.
+    The last change of friction remains after the moves before it have been dropped.
     """
 
     def __init__(self, node: Node, history: HistoryWriter, built: Valve) -> None:
@@ -104,22 +104,22 @@ class MoveLedger:
 
     @property
     def moves(self) -> tuple[Move, ...]:
-        """The moves."""
+        """The moves, oldest first."""
         return tuple(self._moves)
 
     @property
     def newest(self) -> int:
-        """End of the newest move, ns since 1970 (UTC); 0 without any."""
+        """End of the newest move, ns since 1970 (UTC); 0 without moves."""
         return self._moves[-1].end if self._moves else 0
 
     def add(self, moves: Iterable[Move]) -> None:
-        """Add moves, but those with impossible stamps; no kept move goes for them."""
+        """Add moves, except those with impossible stamps, which displace no stored moves."""
         clock = self._node.get_clock()
         now = clock.now().nanoseconds
         for move in moves:
             if problem := stamp_problem(move, self.newest or None, now):
                 self._leave_out(problem)
-                # A recording that is played tells nothing of the clock.
+                # Stamps of a replayed recording are no evidence about the clock.
                 if clock.ros_time_is_active or not is_clock_reset(move, self.newest, now):
                     self._behind.clear()
                     continue
@@ -134,7 +134,7 @@ class MoveLedger:
 
     @property
     def problem(self) -> str:
-        """Why the latest moves are all left out; empty if they are not."""
+        """Why all of the latest moves are left out; empty if they are not."""
         if self._left_in_a_row < _TOLD:
             return ""
         return (
@@ -144,7 +144,7 @@ class MoveLedger:
         )
 
     def _drop_those_ahead(self) -> None:
-        """Drop the kept moves that a clock which was ahead has stamped, here and in the file."""
+        """Drop the stored moves stamped by a clock that was ahead, here and in the file."""
         behind, self._behind = self._behind, []
         begin, count = behind[0].begin, len(self._moves)
         for kept in (self._moves, self._unwritten):
@@ -180,7 +180,7 @@ class MoveLedger:
             self._keep_soon(database.keep_reference, self.reference)
 
     def note_change(self, change: FrictionChange | None) -> None:
-        """Keep a change of friction in place of the one before; None leaves that."""
+        """Store a change of friction in place of the previous one; None keeps the previous one."""
         if change not in (None, self.change):
             self.change = change
             self._keep_soon(database.keep_change, change)
@@ -190,19 +190,19 @@ class MoveLedger:
         self._history.keep_soon(lambda file: keep(file, valve, built, what))
 
     def use(self, built: Valve) -> None:
-        """Follow the valve; other forces need other moves, as they do in the file."""
+        """Follow changes of the valve; another actuator starts a new ledger, as in the file."""
         before, self._built = self._built, built
         if _actuator(before) != _actuator(built):
             self._written_with(before)
             self._clear()
 
     def renew(self) -> None:
-        """Begin anew with a new packing; the history does so with `keep_renewal`."""
+        """Start a new ledger for a new packing; the history does so with `keep_renewal`."""
         self.close()
         self._clear()
 
     def keep(self) -> None:
-        """Have the writer's thread write the new moves now and then, once those before are."""
+        """Periodically write new moves in the thread of the writer, after the previous batch."""
         if time.monotonic() - self._written_at < _WRITE_EVERY:
             return
         self._written_at = time.monotonic()
@@ -212,7 +212,7 @@ class MoveLedger:
             self.close()
 
     def close(self) -> None:
-        """Write what is not written yet; the writer's thread finishes it."""
+        """Queue unwritten data; the thread of the writer finishes them."""
         self._written_with(self._built)
 
     def _clear(self) -> None:
@@ -234,15 +234,16 @@ def _actuator(valve: Valve) -> tuple[float | None, float]:
 
 
 _COMBINE_EVERY = 300_000_000_000
-"""Nanoseconds of stamps from one combination to the next: thousands of moves take 0.05 s."""
+"""Time between two combinations, ns of the stamps: thousands of moves take 0.05 s to combine."""
 
 _SHOWN = ("sliding_friction", "static_friction", "spring_constant", "spring_preload")
 
 
 class EvidenceWatch:
-    """Gathers the moves of the valve, and compares their friction with the baseline; a `Watch`.
+    """Collects the moves of the valve, and compares their friction with the baseline; a `Watch`.
 
-    They are combined in a thread; at the start at once, so that no alarm of before ends.
+    A thread combines the moves. At the start they are combined immediately, so that no earlier
+    alarm ends.
     """
 
     def __init__(
@@ -262,12 +263,12 @@ class EvidenceWatch:
 
     @property
     def evidence(self) -> Evidence:
-        """What the moves say together, as of the latest combination."""
+        """The evidence of all moves, from the latest combination."""
         return self._evidence
 
     @property
     def diagnosis(self) -> Diagnosis | None:
-        """The diagnosis by the moves; None where there is nothing to compare."""
+        """The diagnosis from the moves; None if there is nothing to compare."""
         settings, reference = self._monitor.settings, self._ledger.reference
         valve, factor = settings.valve, self._monitor.common_factor
         found = diagnosis_by_evidence(
@@ -277,14 +278,14 @@ class EvidenceWatch:
 
     @property
     def source(self) -> str:
-        """What the evidence is of, in words."""
+        """Source of the evidence, in words."""
         return (
             f"from {self._evidence.moves} moves in service since {utc_second(self._evidence.since)}"
         )
 
     @property
     def problems(self) -> list[str]:
-        """Why the evidence does not follow the valve; empty if it does."""
+        """Why the evidence cannot follow the valve; empty if it can."""
         return [self._ledger.problem] if self._ledger.problem else []
 
     @property
@@ -295,27 +296,27 @@ class EvidenceWatch:
     async def as_baseline(self) -> Baseline:
         """Return the sliding friction of the moves as baseline; raises RefusalError.
 
-        The newest number of everything else that is known of the valve goes with it.
+        The baseline includes the latest values of all other known numbers of the valve.
         """
         ledger = self._ledger.moves
         begun, newest, before = self._begun, self._ledger.newest, self._job
         found = await done_in(self._worker, evidence_of, ledger, *_combined_by(self._settings))
         if begun == self._begun:
             if self._job is before:
-                self._job, self._combined = None, newest  # what was under way is older
+                self._job, self._combined = None, newest  # the running job has older moves
             self._use(found)
         known = self._monitor.known.numbers
         numbers = {name: one for name, one in known.items() if name not in OF_ONE_RESULT}
         return replace(baseline_by_evidence(self._evidence), numbers=numbers)
 
     async def outdates(self, time: int) -> bool:
-        """Return whether the moves since a time, ns, alone could be a baseline."""
+        """Return whether the moves since a time, ns, alone suffice for a baseline."""
         newer = [one for one in self._ledger.moves if one.begin > time]
         found = await done_in(self._worker, evidence_of, newer, *_combined_by(self._settings))
         return reference_by_evidence(found) is not None
 
     def follow_parameters(self) -> None:
-        """Use the valve and the settings in force; other forces need other moves."""
+        """Use the present valve and settings; another actuator starts a new ledger."""
         before, self._settings = self._settings, self._monitor.settings
         if self._settings.valve != before.valve:
             self._stream = MoveStream(self._settings.valve)
@@ -326,17 +327,17 @@ class EvidenceWatch:
             self._combine()
 
     def forget_samples(self) -> None:
-        """Drop the move under way; the moves that have ended stay."""
+        """Drop the unfinished move, and keep the finished moves."""
         self._stream.forget()
 
     def renew(self) -> None:
-        """Begin anew, as the packing is renewed; the renewal that is kept says so to the file."""
+        """Start afresh with a new packing; the stored renewal does this in the file."""
         self._stream.forget()
         self._ledger.renew()
         self._begin_anew()
 
     def take(self, arrivals: Arrivals) -> None:
-        """Take samples; have the moves combined now and then."""
+        """Take samples, and periodically combine the moves."""
         moves = self._stream.take(arrivals)
         if moves:
             self._ledger.add(moves)
@@ -344,7 +345,7 @@ class EvidenceWatch:
                 self._combine()
 
     def findings(self) -> Sequence[Finding]:
-        """Return that friction has grown or collapsed, if so."""
+        """Return a finding if friction has grown or collapsed."""
         self._settle()
         diagnosis = self.diagnosis
         if diagnosis is None or diagnosis.level < Level.WARN or diagnosis.state.is_uncertain:
@@ -364,7 +365,7 @@ class EvidenceWatch:
         )
 
     def _leads(self, diagnosis: Diagnosis) -> bool:
-        """Return whether the moves are newer than the latest identification, or not against it."""
+        """Return whether the moves are newer than the latest identification, or agree with it."""
         identified, now = self._monitor.seen_until, self._monitor.diagnosis().ratio
         if identified is None or now is None or self._evidence.until > identified:
             return True
@@ -372,7 +373,7 @@ class EvidenceWatch:
         return ratio is None or (ratio.low <= now.high and now.low <= ratio.high)
 
     def values(self) -> Mapping[str, str]:
-        """Return what the moves say, with intervals, or why they do not."""
+        """Return the numbers from the moves with their intervals, or why there are none."""
         self._settle()
         self._ledger.keep()
         found = self._evidence
@@ -403,7 +404,7 @@ class EvidenceWatch:
         return values | ratio_values(ratio, "evidence ")
 
     def close(self) -> None:
-        """Write what is not written yet; the writer's thread finishes it."""
+        """Queue unwritten data; the thread of the writer finishes them."""
         self._ledger.close()
 
     def _numbers(self) -> dict[str, str]:
@@ -426,13 +427,13 @@ class EvidenceWatch:
         return values
 
     def _begin_anew(self) -> None:
-        """Begin without moves; what is under way is of other ones."""
+        """Start without moves, and discard a running combination."""
         self._job, self._is_due = None, False
         self._begun, self._combined = self._begun + 1, 0
         self._use(evidence_of((), *_combined_by(self._settings)))
 
     def _combine(self) -> None:
-        """Have the moves combined in the thread, once what is under way there is done."""
+        """Combine the moves in the thread, after any running combination."""
         self._is_due = self._job is not None
         if self._job is None:
             self._combined = self._ledger.newest

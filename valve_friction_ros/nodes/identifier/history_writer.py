@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The history of the plant, as the identifier writes it, and reads it at the start."""
+"""The history of the plant, written by the identifier and read at its start."""
 
 import contextlib
 import math
@@ -61,15 +61,15 @@ _Change = Callable[["HistoryFile"], None]
 
 
 class WaitingChanges:
-    """Changes in their order, in bounded number, for two threads.
+    """A bounded queue of changes, shared by two threads.
 
-    Where too many wait, the oldest identification is given up: others come. Without any it is the
-    oldest change. How many were given up is counted.
+    If it overflows, the oldest identification is dropped, because more will follow; without an
+    identification it is the oldest change. Dropped changes are counted.
 
     Parameters
     ----------
     most : int
-        Changes that wait at most.
+        Largest number of waiting changes.
     """
 
     def __init__(self, most: int = _MOST) -> None:
@@ -79,7 +79,7 @@ class WaitingChanges:
         self._identifications = self._others = 0
 
     def add(self, change: _Change, identification: bool = False) -> None:
-        """Have a change wait, unless it does; give up another one where there are too many."""
+        """Queue a change that is not yet waiting; if there are too many, drop another one."""
         with self._lock:
             self._waiting.setdefault(change, identification)
             if len(self._waiting) > self._most:
@@ -90,32 +90,32 @@ class WaitingChanges:
                 self._others += not is_one
 
     def first(self) -> _Change | None:
-        """Return the oldest change, which goes on waiting; None if none waits."""
+        """Return the oldest change without removing it, or None."""
         with self._lock:
             return next(iter(self._waiting), None)
 
     def remove(self, change: _Change) -> None:
-        """Let a change go that was made, unless it was given up meanwhile."""
+        """Remove a change that has been made, unless it was dropped meanwhile."""
         with self._lock:
             self._waiting.pop(change, None)
 
     @property
     def given_up(self) -> str:
-        """What was given up, in words; empty if nothing was."""
+        """The numbers of dropped changes, in words; empty without any."""
         counts = (self._identifications, "identification"), (self._others, "other change")
         told = [f"{count} {what}{'s' * (count > 1)}" for count, what in counts if count]
         return " and ".join(told)
 
     def forget_given_up(self) -> None:
-        """Count from now on."""
+        """Reset the numbers of dropped changes."""
         with self._lock:
             self._identifications = self._others = 0
 
 
 class _HistorySending:
-    """Sends the history to a server, if one is named; without it, nothing is done.
+    """Sends the history to a server if one is named, else does nothing.
 
-    Raises ValueError if the address of the server cannot be used, or there is no file.
+    Raises ValueError if the address of the server is invalid, or there is no file.
     """
 
     def __init__(self, node: Node, path: Path | None, valve: KeptValve) -> None:
@@ -132,7 +132,7 @@ class _HistorySending:
         self._sender = database.sender_of(path, server)
 
     def take(self) -> None:
-        """Take the rows of the valve, where another machine has kept them; wait some seconds."""
+        """Fetch rows of the valve that another machine has stored; may take some seconds."""
         if self._sender is not None:
             self._untaken = self._sender.take(self._valve)
         if self._untaken is not None:
@@ -170,11 +170,11 @@ class _HistorySending:
 
 
 _HANDOVER = 10.0
-"""Time, s, for which a node that ends may still hold the history."""
+"""Time, s, for which a node that is ending may still hold the history."""
 
 
 class _HistoryGuard:
-    """Watches the history file of one valve, and claims what it holds of the valve."""
+    """Watches the history file, and claims the rows of one valve in it."""
 
     def __init__(self, path: Path, valve: str) -> None:
         self._path, self._valve = path, valve
@@ -198,7 +198,7 @@ class _HistoryGuard:
 
     @property
     def is_another(self) -> bool:
-        """Whether the file is not the one that was noted last, or is not there."""
+        """Whether the file has been replaced or removed since it was last noted."""
         return self._known is not None and self._identity() != self._known
 
     def note(self) -> None:
@@ -213,26 +213,26 @@ class _HistoryGuard:
 
 
 _LONGEST = 60.0
-"""Time, s, after which a writing that has not ended is a problem; a busy file ends it sooner."""
+"""Time, s, after which an unfinished write is a problem; a locked file fails sooner."""
 _END_OF_TIME = 2**63 - 1
 
 _T = TypeVar("_T")
 
 
 class HistoryWriter:
-    """Writes to the history in another thread, so that no slow disk holds up the node.
+    """Writes to the history in another thread, so that a slow disk does not delay the node.
 
-    What could not be written waits, and is tried again with what comes next.
+    Changes that could not be written wait, and are retried with the next change.
 
     Attributes
     ----------
     valve : KeptValve
-        The valve, as the history calls it.
+        The valve, with its name in the history.
     baseline : KeptBaseline or None
-        The baseline that was kept last, with its record; another one may be in force. None where
-        that was withdrawn.
+        The last stored baseline, with its record; another one may be in force. None if it was
+        withdrawn.
     trend : Trend or None
-        Drift of the Coulomb friction, as of the latest identification.
+        Drift of the Coulomb friction at the latest identification.
     """
 
     def __init__(
@@ -244,7 +244,7 @@ class HistoryWriter:
         path = node.get_parameter("history_file").value
         try:
             self._file = database.HistoryFile(Path(path).expanduser()) if path else None
-        except RuntimeError as error:  # pathlib's
+        except RuntimeError as error:  # of pathlib
             raise ValueError(
                 f"history_file {path}: {error} Set HOME or ROS_HOME, or choose another file"
             ) from None
@@ -263,12 +263,12 @@ class HistoryWriter:
 
     @property
     def path(self) -> Path | None:
-        """The file; None if nothing is kept."""
+        """The history file; None if nothing is stored."""
         return None if self._file is None else self._file.path
 
     @property
     def problems(self) -> list[str]:
-        """Why the latest writing failed, or has not ended; empty if it did not."""
+        """Why the latest write failed or has not finished; empty if it succeeded."""
         problem = self._problem
         if (busy := self._writer.busy_for()) > _LONGEST:
             problem = f"{self.path} has not responded for {busy:.0f} s"
@@ -283,13 +283,13 @@ class HistoryWriter:
         return None if self._guard is None else self._guard.conflict
 
     def close(self) -> None:
-        """Leave the history to another node."""
+        """Release the history for another node."""
         if self._guard is not None:
             self._guard.claim.release()
         self._sending.close()
 
     def values(self) -> dict[str, str]:
-        """Return what the diagnostics say: that nothing is kept, or how it goes to a server."""
+        """Return the values of the diagnostics: nothing is stored, or the state of the sending."""
         if self._file is not None:
             return self._sending.values()
         lost = (
@@ -300,7 +300,7 @@ class HistoryWriter:
 
     @property
     def reservation(self) -> str:
-        """Addition to the answer that something was kept; empty if it is in the file."""
+        """Warning to add to a success message; empty if the change is in the file."""
         return "".join(f", but it is lost when this node stops: {one}" for one in self.problems)
 
     def read(self) -> ValveHistory | None:
@@ -314,10 +314,9 @@ class HistoryWriter:
         return histories[0] if histories else None
 
     def prepare(self) -> HistoryEntry | None:
-        """Make the file if it is not there, and read the valve's baseline in it, if any.
+        """Create the file if missing, read the baseline of the valve, and return the last success.
 
-        What another machine has kept of the valve since is taken from the server first.
-        Returns the last success, if any.
+        Rows of the valve that another machine has stored since are first fetched from the server.
         """
         self._tried(lambda file, _: file.prepare())
         if self._guard is not None:
@@ -330,19 +329,19 @@ class HistoryWriter:
         return self._tried(lambda file, name: file.last_success(name))
 
     def known_numbers(self, earlier: HistoryEntry) -> KnownNumbers | None:
-        """Read what is known of the valve since its baseline was set, by the last success, too."""
+        """Read the known numbers of the valve since its baseline, including the last success."""
         built, kept = self._monitor.settings.valve, self.baseline
         since = earlier.time if kept is None else min(kept.time, earlier.time)
         return self._tried(lambda file, name: file.known_numbers(name, built, since))
 
     def read_trend(self) -> None:
-        """Compute the trend with the baseline and settings of now."""
+        """Compute the trend with the present baseline and settings."""
         self.trend = self._tried(self._trend_job())
 
     def _tried(self, job: Callable[..., _T], *arguments: object) -> _T | None:
-        """Do a job on the file and the name of the valve, if there is a file.
+        """Run a job with the file and the name of the valve, if there is a file.
 
-        Of several problems the first is reported.
+        Only the first of several problems is reported.
         """
         if self._file is None:
             return None
@@ -356,7 +355,7 @@ class HistoryWriter:
     async def keep(
         self, identified: IdentificationInput, refusal: RefusalError | None = None
     ) -> None:
-        """Keep the identification that the monitor has just accepted, or why it was refused."""
+        """Store the identification that the monitor has just accepted, or the cause of refusal."""
         monitor, now = self._monitor, self._node.get_clock().now().nanoseconds
         found = monitor.stamp if refusal is None else None
         days = self._node.get_parameter("history_days").value
@@ -367,9 +366,9 @@ class HistoryWriter:
     def kept_now(
         self, baseline: Baseline, level: Level, evidence_since: int | None = None
     ) -> KeptBaseline:
-        """Describe a baseline that is taken now, at a level of the valve.
+        """Return a new baseline for the history, set now, at a level of the valve.
 
-        It is of the latest result, or of moves since a time.
+        It is from the latest result, or from the moves since a time.
         """
         now, monitor = self._node.get_clock().now().nanoseconds, self._monitor
         since, record = now if monitor.stamp is None else monitor.stamp, None
@@ -381,9 +380,9 @@ class HistoryWriter:
         return KeptBaseline(baseline, now, since, record, replaced, level=level)
 
     def replaced_now(self, last: KeptBaseline, by: str, level: Level) -> KeptBaseline:
-        """Describe that what the last baseline has replaced comes back now, for `by`, at a level.
+        """Return the predecessor of the last baseline for the history, restored now by `by`.
 
-        Where it was kept, it comes back with its record and the beginning of its trend.
+        If it was stored, it has its record and the start of its trend.
         """
         former = self._former
         if former is None or former.baseline != last.replaced:
@@ -398,33 +397,33 @@ class HistoryWriter:
         )
 
     async def keep_baseline(self, kept: KeptBaseline) -> None:
-        """Keep a baseline that is in force from now on, or none."""
+        """Store a baseline that is in force from now on, or its withdrawal."""
         self._former, self.baseline = self.baseline, None if kept.withdrawn else kept
         await self.keep_change(lambda file: file.set_baseline(self.valve, kept))
 
     def usage(self) -> ValveUsage | None:
-        """Read what the valve has done; None without a file, or where it cannot be read."""
+        """Read the usage of the valve; None without a readable file."""
         return self._tried(database.read_usage)
 
     def told_level(self) -> Level | None:
-        """Read the level that was told last, if any."""
+        """Read the level reported last, or None."""
         return self._tried(database.read_told_level)
 
     def keep_told_level(self, level: Level) -> None:
-        """Keep the level that was told last, soon."""
+        """Queue the level reported last for storage."""
         self.keep_soon(lambda file: database.keep_told_level(file, self.valve, level))
 
     def alarms(self) -> dict[AlarmKind, Alarm]:
-        """Read the alarms of the valve; none without a file, or where it cannot be read."""
+        """Read the alarms of the valve; empty without a readable file."""
         return self._tried(database.read_alarms) or {}
 
     def alarm_news(self) -> dict[AlarmKind, Alarm]:
-        """Return alarms of the valve that have changed in the file, also by another process."""
+        """Return the alarms of the valve changed in the file, also by another process."""
         if self._file is None:
             return {}
         feed = database.alarm_feed(self._file.path)
         if self._look is not None and self._look.done():
-            with contextlib.suppress(HistoryError):  # writing says what is wrong
+            with contextlib.suppress(HistoryError):  # a write reports the problem
                 self._look.result()
             self._look = None
         if self._look is None and feed.is_due(time.monotonic()):
@@ -432,9 +431,9 @@ class HistoryWriter:
         return feed.take(self.valve.name)
 
     def last_alarm(self) -> AlarmRecording | None:
-        """Read the latest recording of an alarm, if any.
+        """Read the latest recording of an alarm, or None.
 
-        Those of a time to come, from before the clock went back, are the latest if all are.
+        Recordings with a future time, from before a clock was set back, are used only if all are.
         """
         found = self._tried(database.alarm_recordings) or ()
         now = self._node.get_clock().now().nanoseconds
@@ -442,12 +441,12 @@ class HistoryWriter:
         return max(past or found, key=lambda one: one.time, default=None)
 
     async def keep_change(self, change: _Change) -> None:
-        """Make a change in the writer's thread, and wait until it is written."""
+        """Make a change in the thread of the writer, and wait until it is written."""
         with self._failures_remembered():
             await self._written(change)
 
     async def keep_step(self, change: _Change) -> None:
-        """Make a change like `keep_change`, which leaves the trend as it is."""
+        """Make a change like `keep_change`, but without updating the trend."""
         if self._file is None:
             return
         self._waiting.add(change)
@@ -455,36 +454,36 @@ class HistoryWriter:
             await done_in(self._writer, self._write_waiting, self._file, time.monotonic())
 
     def moves(self) -> tuple[Move, ...]:
-        """Read the moves of the valve in service; none without a file."""
+        """Read the moves of the valve in service; empty without a file."""
         return self._tried(database.read_moves, self._monitor.settings.valve) or ()
 
     def reference(self) -> Reference | None:
-        """Read what the moves of the valve said first; None without a file."""
+        """Read the reference from the first moves of the valve; None without a file."""
         return self._tried(database.read_reference, self._monitor.settings.valve)
 
     def change(self) -> FrictionChange | None:
-        """Read the last change of friction that the moves showed; None without a file."""
+        """Read the last change of friction found in the moves; None without a file."""
         return self._tried(database.read_change, self._monitor.settings.valve)
 
     def answers(self) -> tuple[StepAnswer, ...]:
-        """Read the answers of the stem to its command; none without a file."""
+        """Read the responses of the stem to its command; empty without a file."""
         return self._tried(database.read_answers, self._monitor.settings.valve.travel) or ()
 
     def keep_soon(self, change: _Change) -> None:
-        """Make a change in the writer's thread, and do not wait; `settle` takes its outcome.
+        """Queue a change for the thread of the writer; `settle` processes the outcome.
 
-        A change that waits already is not made twice.
+        A change that is already waiting is not made twice.
         """
         if self._file is None:
             return
         self._waiting.add(change)
-        # A job that has begun may have looked for the last time.
+        # A running job may already have checked the queue for the last time.
         if all(one.running() or one.done() for one in self._under_way):
             job = self._writer.submit(self._write_waiting, self._file, time.monotonic())
             self._under_way.append(job)
 
     def settle(self) -> None:
-        """Take the outcomes of `keep_soon` that are there, and claim what was not granted."""
+        """Process finished outcomes of `keep_soon`, and retry a claim that was refused."""
         if self._guard is not None:
             self._guard.ask()
         self._sending.follow()
@@ -493,7 +492,7 @@ class HistoryWriter:
                 self._under_way.pop(0).result()
 
     def _trend_job(self) -> Callable[["HistoryFile", str], Trend | None]:
-        """Return what computes the trend with the baseline and settings of now, in any thread."""
+        """Return a job for any thread: the trend with the present baseline and settings."""
         baseline, settings = self._monitor.baseline, self._monitor.settings
         return lambda file, name: database.current_trend(file, name, baseline, settings)
 
@@ -522,7 +521,7 @@ class HistoryWriter:
     def _write(
         self, file: "HistoryFile", asked: float, trend: Callable[["HistoryFile", str], Trend | None]
     ) -> Trend | None:
-        """Write, in the writer's thread, all that waits; asked for at a time (monotonic, s)."""
+        """Write all waiting changes, requested at `asked` (s, monotonic); return the trend."""
         self._write_waiting(file, asked)
         return trend(file, self.valve.name)
 
@@ -538,7 +537,7 @@ class HistoryWriter:
         self._guard.note()
 
     def _keep_again(self, file: "HistoryFile") -> None:
-        """Keep the baseline in force where the file was removed, or another one has none."""
+        """Store the baseline again if the file was removed, or replaced by one without it."""
         name, kept = self.valve.name, self.baseline
         told = "its baseline applies after a restart"
         if kept is not None and not (file.path.exists() and file.baselines(name)):

@@ -83,13 +83,13 @@ from valve_friction_ros.streams import Arrivals, DataQuality, Intake, Signal
 from valve_friction_ros.wording import Code, Statement, said, sentence
 
 CHANGEABLE = tuple(one for one in NODES["identifier"] if not one.read_only)
-"""Those that can be changed while the node runs."""
+"""Settings that can be changed while the node runs."""
 
 
 def monitor_settings(values: Mapping[str, Any]) -> MonitorSettings:
     """Build the settings of the monitor from parameter values.
 
-    Raises ValueError if they break a rule; the message names it.
+    Raises ValueError, which names the rule, if they violate a rule.
     """
     given = {one.name: values[one.name] for one in IDENTIFICATION if one.is_given(values[one.name])}
     stated = {name: values[name] for name in STATED if values[name] is not None}
@@ -112,7 +112,7 @@ def monitor_settings(values: Mapping[str, Any]) -> MonitorSettings:
 
 
 def _require_valid(values: Mapping[str, Any]) -> None:
-    """Raise ValueError, which names the broken rule, if parameter values break one."""
+    """Raise ValueError, which names the rule, if parameter values violate a rule."""
     settings = monitor_settings(values)
     how = settings.identification
     require_valve_units(settings.valve, {**how.stated, **how.fixed})
@@ -125,19 +125,19 @@ def _require_valid(values: Mapping[str, Any]) -> None:
 
 
 class _WholeValve:
-    """Shows the findings of the latest result, and each change with its interval (a `Watch`)."""
+    """Reports the findings of the latest result, and each change with its interval; a `Watch`."""
 
     def __init__(self, monitor: FrictionMonitor) -> None:
         self._monitor = monitor
 
     def take(self, _: Arrivals) -> None:
-        """Take no samples: the identification has them."""
+        """Ignore samples: the identification uses them."""
 
     def findings(self) -> Sequence[Finding]:
         return self._monitor.findings
 
     def values(self) -> dict[str, str]:
-        """Return the changes: of a ratio in percent, else in the number's unit."""
+        """Return the changes: for a ratio in percent, else in the unit of the number."""
         values = {}
         for name, change in self._monitor.changes.items():
             unit = DIFFERENCES.get(name, "%")
@@ -152,39 +152,39 @@ class Watch(Protocol):
     """Follows the samples of a valve, and adds to its diagnostics."""
 
     def take(self, arrivals: Arrivals) -> None:
-        """Take samples, some 20 times a second, in the executor's thread; it must return soon."""
+        """Take samples about 20 times a second, in the executor's thread; must return quickly."""
 
     def findings(self) -> Sequence[Finding]:
-        """Return what is found on the valve now; each raises its level where it is more severe."""
+        """Return the present findings; each raises the level of the valve if it is more severe."""
 
     def values(self) -> Mapping[str, str]:
-        """Return values of the diagnostics, the unit of a number in its key."""
+        """Return values of the diagnostics, with the unit of a number in its key."""
 
 
 _DIAGNOSTIC_PERIOD = 1.0
 _PROCESSES = 1
-"""Processes of the executable that identify, at most."""
+"""Largest number of processes that identify for the executable."""
 _CLEARED = said(Code.CLEARED_AS_STAMPS_GO_BACK)
 _TELLING = "diagnostics"
 
 
 class Identifier(ManagedNode):
-    """Gathers pressure and stem position, identifies them on request, publishes the diagnosis.
+    """Collects pressure and stem position, identifies on request, and publishes the diagnosis.
 
-    The identification runs in a thread of its own on a copy of the buffer, while the executor
-    goes on; its callback awaits it, so the executor's thread alone touches the monitor.
+    The identification runs in its own thread on a copy of the buffer while the executor continues.
+    Its callback awaits the result, so only the thread of the executor accesses the monitor.
 
-    Add it to any executor of rclpy. Raises rclpy's exceptions for a parameter of the wrong type or
-    range, and ValueError for one that breaks a rule.
+    Add it to any executor of rclpy. Raises rclpy's exceptions for a parameter of wrong type or
+    range, and ValueError for a parameter that violates a rule.
 
     Parameters
     ----------
     workers : Workers, optional
-        Its threads, which identifiers of one process share; its own, if there are none.
+        Threads shared by the identifiers of one process; by default its own.
     namespace : str, optional
-        Namespace of the valve, where it is not given by a ROS argument.
+        Namespace of the valve, if it is not given by a ROS argument.
     **named
-        What else `rclpy.node.Node` takes, such as `context` and `parameter_overrides`.
+        Further arguments of `rclpy.node.Node`, such as `context` and `parameter_overrides`.
     """
 
     def __init__(
@@ -207,7 +207,7 @@ class Identifier(ManagedNode):
         self.begin()
 
     def configure(self) -> None:
-        """Build all that watches the valve, from the parameters."""
+        """Create all parts that monitor the valve, from the parameters."""
         workers = self._shared_workers or self.opened.enter_context(running_workers())
         self._workers = workers
         warn_of_columns(self)
@@ -277,7 +277,7 @@ class Identifier(ManagedNode):
             ("reset_usage", partial(self._shown, self._reset_usage), ""),
         ):
             create_trigger_service(self, f"~/{name}", work, failure)
-        steady = Clock(clock_type=ClockType.STEADY_TIME)  # sim time may never come, or stand still
+        steady = Clock(clock_type=ClockType.STEADY_TIME)  # sim time may never start, or stop
         self.create_timer(_DIAGNOSTIC_PERIOD, self._tell, clock=steady)
         jumps = self.get_clock().create_jump_callback(
             JumpThreshold(
@@ -293,7 +293,7 @@ class Identifier(ManagedNode):
         self._readiness.look()
 
     def overdue(self) -> str | None:
-        """Say that the work under way has not ended within its limit, if so."""
+        """Describe running work that exceeds its time limit, or return None."""
         if not self.is_configured:
             return None
         limit = self.get_parameter("identification_limit").value
@@ -311,7 +311,7 @@ class Identifier(ManagedNode):
         )
 
     def stuck_status(self, problem: str) -> DiagnosticStatus:
-        """Return the status of a valve that nobody monitors."""
+        """Return the status of a valve that is not monitored."""
         return stuck_status(self._status_name, self._tag, problem)
 
     def _take_samples(self, arrivals: Arrivals) -> None:
@@ -331,7 +331,7 @@ class Identifier(ManagedNode):
         self._judge(Arrivals.joined(()), self._monitor.buffer.drop_damaged(signal, count))
 
     def _judge(self, arrivals: Arrivals, intake: Intake) -> None:
-        now = self.get_clock().now().nanoseconds  # 0: simulated time has not begun
+        now = self.get_clock().now().nanoseconds  # 0: simulated time has not started
         tolerance = self.get_parameter("clock_tolerance").value
         self._quality.see(arrivals, intake, time.monotonic(), now or None, tolerance)
 
@@ -356,7 +356,7 @@ class Identifier(ManagedNode):
         self._fault_log.note(said(Code.TIME_JUMPS), cleared, time.monotonic())
 
     async def _identify(self) -> str:
-        """Identify the buffer, and keep the result or the refusal; return the diagnosis."""
+        """Identify the buffer, and store the result or the refusal; return the diagnosis."""
         self._inputs.take(is_all=True)
         record, refused = self._identification.record(), None
         self._board.is_requested = True
@@ -372,7 +372,7 @@ class Identifier(ManagedNode):
             raise
         answer = "; ".join(
             (
-                *self._silence(),  # the cause where there are no samples
+                *self._silence(),  # the cause if there are no samples
                 str(refused or self._monitor.diagnosis().message),
                 *(one.message for one in by_severity(self._monitor.findings)),
             )
@@ -384,9 +384,9 @@ class Identifier(ManagedNode):
         return answer
 
     async def _identify_as_scheduled(self) -> None:
-        """Identify the buffer; a record that cannot be identified leaves the estimate as it is.
+        """Identify the buffer; a record that cannot be identified does not change the estimate.
 
-        A refusal is kept only where its record has changed what is found on the valve.
+        A refusal is stored only if its record has changed the findings on the valve.
         """
         self._inputs.take(is_all=True)
         before, refused = self._found(), None
@@ -409,7 +409,7 @@ class Identifier(ManagedNode):
         self._publish_diagnostics()
 
     def _found(self) -> tuple[Finding | None, ...]:
-        """Return what records have found on the valve beside an identified friction."""
+        """Return the findings of records other than identified friction."""
         return (*self._monitor.findings, self._monitor.held)
 
     async def _save(self) -> str:
@@ -447,9 +447,9 @@ class Identifier(ManagedNode):
         return self._inputs.problems(self.get_parameter("input_timeout").value)
 
     def _faults(self) -> dict[Statement, Statement]:
-        """Return what is wrong with the data, and all that is to be said of it.
+        """Return the faults of the data, by fixed name, with their full statements.
 
-        A recording that is played has stamps of its own.
+        Faults of the clock are judged differently for a replayed recording, which has old stamps.
         """
         now = time.monotonic()
         found = self._quality.faults(now)
@@ -459,7 +459,7 @@ class Identifier(ManagedNode):
         return {one.what: one.statement(valve, joint) for one in found}
 
     def _data_values(self) -> dict[str, str]:
-        """Return how long no sample of each input could be used."""
+        """Return the time for which each input has had no usable sample."""
         now, values = time.monotonic(), dict[str, str]()
         pressure, stem = (self._quality.unusable(one, now) for one in Signal)
         if math.isfinite(pressure):
@@ -472,11 +472,11 @@ class Identifier(ManagedNode):
         return self._worst(one for watch in self._watches for one in watch.findings())
 
     def _worst(self, findings: Iterable[Finding]) -> Level:
-        """Return the most severe level of the diagnosis of friction and of what else is found."""
+        """Return the highest level of the diagnosis of friction and the findings."""
         return max([self._monitor.diagnosis().level, *(one.level for one in findings)])
 
     def _tell(self) -> None:
-        """Publish the diagnostics; a bug in them is published in their stead."""
+        """Publish the diagnostics, or a bug in them."""
         with self.guarded(_TELLING):
             self._publish_diagnostics()
         if (bug := self.failure_of(_TELLING)) is None:
@@ -515,7 +515,7 @@ class Identifier(ManagedNode):
             self._board.values(),
         )
         self._estimate_topic.publish(estimate)
-        del found[self._usage]  # the life of a packing, which no samples show
+        del found[self._usage]  # the life of a packing is not seen in samples
         level = self._worst(finding for some in found.values() for finding in some)
         self._alarm.follow(level, estimate.message, self._inputs.names)
         upkeep = [*self._history.problems, *filter(None, [self._history.conflict])]

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""``~/save`` and ``~/report``: the identifier's buffer as a bag, a page on its last result."""
+"""``~/save`` and ``~/report``: the buffer as a bag, and a page on the last result."""
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -32,18 +32,17 @@ from valve_friction_ros.streams import Snapshot, utc
 def bag_writer(
     node: Node, valve: Valve, names: StreamNames
 ) -> Callable[[Path, str, Snapshot, Path | None], Path]:
-    """Return what writes a snapshot as a bag into a folder, by a name, in any thread.
+    """Return a function that writes a snapshot as a named bag into a folder, in any thread.
 
-    The last argument is a bag that it replaces, if any. It returns the path of the bag, and raises
-    RefusalError if the libraries that bags need are not there or the snapshot is empty, and
-    OSError.
+    Its last argument is the bag to replace, if any. It returns the path of the bag. It raises
+    RefusalError if the libraries for bags are missing or the snapshot is empty, and OSError.
     """
     names_of = (*(one.name for one in IDENTIFICATION), *STATED)
     described = {name: node.get_parameter(name).value for name in names_of}
     described = {name: value for name, value in described.items() if value is not None}
 
     def write(folder: Path, name: str, snapshot: Snapshot, replaced: Path | None) -> Path:
-        # Costs memory and time at the start, and most nodes never save.
+        # Imported late, because it costs memory and time, and most nodes never save.
         try:
             with bag_libraries():
                 from valve_friction_ros.records.bags.writing import write_bag  # noqa: PLC0415
@@ -56,7 +55,7 @@ def bag_writer(
 
 
 class BagSaver:
-    """Writes what the buffer holds as bags, as long as they have room.
+    """Writes the buffer as bags within a limit of disk space.
 
     Raises ValueError if the folder cannot be used.
     """
@@ -66,10 +65,10 @@ class BagSaver:
         self._folder = OutputFolder(node.get_parameter("save_folder").value, "saved", "a bag")
 
     async def saved(self, names: StreamNames, worker: ThreadPoolExecutor) -> Path:
-        """Write what the buffer holds now, in a thread of `worker`; return the path of the bag.
+        """Write the present buffer in a thread of `worker`; return the path of the bag.
 
-        Raises RefusalError if it cannot be written or has no room, or the libraries that bags need
-        are not there.
+        Raises RefusalError if it cannot be written, there is not enough space, or the libraries for
+        bags are missing.
         """
         now = self._node.get_clock().now().nanoseconds
         snapshot, settings = self._monitor.input()
@@ -80,7 +79,7 @@ class BagSaver:
 
 
 class ReportWriter:
-    """Writes pages on the last result, with what is known of the valve beside it.
+    """Writes pages on the last result, with all further data on the valve.
 
     Raises ValueError if the folder cannot be used.
     """
@@ -103,7 +102,8 @@ class ReportWriter:
     async def written(self, worker: ThreadPoolExecutor) -> Path:
         """Write a page on the last result, in a thread of `worker`; return its path.
 
-        Raises RefusalError if there is no result, or the page cannot be written or has no room.
+        Raises RefusalError if there is no result, the page cannot be written, or there is not
+        enough space.
         """
         write_page = self.of_now()
 
@@ -115,9 +115,9 @@ class ReportWriter:
         return await self._folder.kept(self._node, self._monitor.stamp or 0, worker, write)
 
     def of_now(self) -> Callable[[Path], None]:
-        """Return what writes the page on the last result of now to a path, in any thread.
+        """Return a function that writes a page on the present last result to a path, in any thread.
 
-        Raises RefusalError if there is no result; what it returns raises OSError.
+        Raises RefusalError if there is no result. The function itself may raise OSError.
         """
         monitor, history = self._monitor, self._history
         if monitor.result is None or monitor.stamp is None:
@@ -151,7 +151,7 @@ class ReportWriter:
             except HistoryError as error:
                 unread = [f"no trend, because the history cannot be read: {error}"]
             told = facts | {"history": before, "notes": (*notes, *unread)}
-            # Its libraries cost memory, and most nodes never report.
+            # Imported late, because its libraries cost memory, and most nodes never report.
             room = "valve_friction_ros.reports"
             self._apart.done(imported, room, "write_identification_report", path, told)
             give_back_memory()

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Whether the stem follows in service: its pressure, and ``stem_command``."""
+"""Response of the stem in service to its pressure and to ``stem_command``."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -48,11 +48,11 @@ from valve_friction_ros.streams import Arrivals, Kind, Samples, utc_second
 from valve_friction_ros.wording import Code, said
 
 _PATIENCE = 60.0
-"""Time, s, for which commands come, and none can be used, before it is found."""
+"""Time, s, for which commands arrive but are all unusable, before this is a finding."""
 
 
 class _CommandTrouble:
-    """Remembers what is wrong with the latest commands, and since when none could be used."""
+    """Remembers the problem of the latest commands, and since when none was usable."""
 
     def __init__(self) -> None:
         self.forget()
@@ -62,7 +62,7 @@ class _CommandTrouble:
         self._first = self._last = math.nan
 
     def take(self, problem: str, is_used: bool, now: float) -> None:
-        """Note what is wrong with commands that have come at a time, s, and whether one is used."""
+        """Record the problem of the commands received at `now`, s, and whether any was usable."""
         self.problem = problem
         if is_used:
             self._first = self._last = math.nan
@@ -72,7 +72,7 @@ class _CommandTrouble:
             self._first = now
 
     def findings(self) -> list[Finding]:
-        """Return a finding where commands have come for a minute, and none could be used."""
+        """Return a finding if commands have arrived for a minute and none was usable."""
         if not self._last - self._first >= _PATIENCE:
             return []
         unusable = said(Code.COMMANDS_UNUSABLE, problem=self.problem)
@@ -83,17 +83,17 @@ _SILENCE = 1.0
 """Time without messages, s, after which the quality of service is suspected."""
 
 _EVERY = 0.5
-"""Time, s, of samples that is taken at once: each call costs as much as a thousand samples."""
+"""Time span of the samples processed at once, s: each call costs as much as a thousand samples."""
 
 _WRITE_EVERY = 5.0
-"""Time between two writings, s. A killed node loses so much, and the move under way."""
+"""Time between two writes, s. If the node is killed, this time and an unfinished move are lost."""
 
 _MOST_WAITING = 20_000
-"""Samples that are taken at once at most, whatever their stamps."""
+"""Largest number of samples processed at once, whatever their stamps."""
 
 
 class ResponseWatch:
-    """Follows ``stem_command``; without one it says nothing, but what earlier runs have kept."""
+    """Follows ``stem_command``; without commands it reports only results of earlier runs."""
 
     def __init__(self, node: Node, monitor: FrictionMonitor, history: HistoryWriter) -> None:
         self._node, self._friction, self._history = node, monitor, history
@@ -120,7 +120,7 @@ class ResponseWatch:
         self._held = 0
 
     def take(self, arrivals: Arrivals) -> None:
-        """Take commands, and samples of pressure and stem."""
+        """Take commands and samples of pressure and stem position."""
         self._take_commands()
         if self._monitor is None and not self._commands:
             return
@@ -161,7 +161,7 @@ class ResponseWatch:
             wrong = "a command is not a number"
         else:
             metres = metres * (travel / 100 if unit == "%" else 1.0)
-            # Positioners take a little more than 0 to 100 %.
+            # Positioners accept slightly more than 0 to 100 %.
             good = np.abs(metres - travel / 2) <= travel
             if not good.all():
                 place = float(given.values[~good][0])
@@ -177,7 +177,7 @@ class ResponseWatch:
         return self._node.get_parameter(name).value
 
     def _work(self) -> None:
-        """Hand on what was gathered; another travel, or an empty gathering, begins anew."""
+        """Process the collected samples; a new travel, or no samples, starts afresh."""
         travel = self._friction.settings.valve.travel
         if travel != self._travel:
             self.close()
@@ -198,17 +198,17 @@ class ResponseWatch:
 
     @property
     def summary(self) -> ResponseSummary | None:
-        """The answers that count; None without any command."""
+        """Summary of the evaluated responses; None without any command."""
         return None if self._monitor is None else self._monitor.summary
 
     def renew(self) -> None:
-        """Begin anew, as the packing is renewed; the renewal that is kept says so to the file."""
+        """Start afresh with a new packing; the stored renewal does this in the file."""
         self.close()
         if self._monitor is not None:
             self._begin()
 
     def close(self) -> None:
-        """Write what is not written yet; the writer's thread finishes it."""
+        """Queue unwritten data; the thread of the writer finishes them."""
         self._written_at = monotonic()
         if self._monitor is not None and (moves := self._monitor.drain()):
             valve, travel, days = self._history.valve, self._travel, self._value("history_days")
@@ -217,7 +217,7 @@ class ResponseWatch:
             )
 
     def findings(self) -> Sequence[Finding]:
-        """Return what is wrong with the answers."""
+        """Return the problems of the responses."""
         self._follow_publishers()
         findings = self._trouble.findings()
         if self._monitor is not None:
@@ -232,12 +232,12 @@ class ResponseWatch:
         return findings
 
     def _dead_band(self) -> float:
-        """Return that of the latest identification, share of the travel; nan if not known."""
+        """Return the dead band of the latest identification over the travel; nan if unknown."""
         estimate = self._friction.estimate
         return math.nan if estimate is None else dead_band(estimate, self._friction.settings.valve)
 
     def _follow_publishers(self) -> None:
-        """Follow another quality of service; forget a command that nobody gives any more."""
+        """Adapt the quality of service; forget a command that is no longer published."""
         silence = self._polled.watch.silence()
         if silence > _SILENCE:
             self._polled.follow_publishers()
@@ -265,7 +265,7 @@ class ResponseWatch:
 
 
 def _clock_problem(offset: float) -> str:
-    """Say by how many seconds the command is ahead of the stem, or behind it, if it is."""
+    """Describe how far the clock of the command is ahead of or behind the stem; '' if equal."""
     if not offset:
         return ""
     side = "ahead of" if offset > 0 else "behind"
@@ -323,7 +323,7 @@ def _move_values(summary: ResponseSummary, left_out: int) -> dict[str, str]:
 
 
 class StandstillWatch:
-    """Finds a seized stem without a ``stem_command``; satisfies `Watch`."""
+    """Finds a seized stem without a ``stem_command``; a `Watch`."""
 
     def __init__(self, monitor: FrictionMonitor) -> None:
         self._monitor = monitor
@@ -331,7 +331,7 @@ class StandstillWatch:
         self._counter: StandstillCounter | None = None
 
     def take(self, arrivals: Arrivals) -> None:
-        """Follow pressure and stem, where the travel is known."""
+        """Follow pressure and stem position, if the travel is known."""
         valve = self._monitor.settings.valve
         if valve.travel != self._travel:
             self._travel = valve.travel
@@ -347,7 +347,7 @@ class StandstillWatch:
         )
 
     def findings(self) -> Sequence[Finding]:
-        """Return that the stem is held, if it is, in service or in the latest test."""
+        """Return a finding if the stem is held, in service or in the latest test."""
         still, baseline = self._standstill(), self._monitor.baseline
         settings, found = self._monitor.settings, None
         if still is not None and baseline is not None:
@@ -357,7 +357,7 @@ class StandstillWatch:
         return [] if found is None else [found]
 
     def values(self) -> Mapping[str, str]:
-        """Return since when the stem rests, and the static friction that this needs."""
+        """Return since when the stem has been at rest, and the static friction this requires."""
         still = self._standstill()
         if still is None:
             return {}

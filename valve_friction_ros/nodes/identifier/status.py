@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""What an identifier publishes of its valve: its status, and the latched topics."""
+"""Publications of an identifier: the status of its valve, and the latched topics."""
 
 import math
 import time
@@ -58,11 +58,11 @@ def estimate_status(
     trend: Trend | None = None,
     alarms: Mapping[str, str] = _NO_VALUES,
 ) -> DiagnosticStatus:
-    """Compose what is known of a valve; the unit of a number is in its key.
+    """Compose the knowledge about a valve; the unit of a number is in its key.
 
-    It changes only when that does: it has the time of the estimate in place of an age, and nothing
-    of the inputs; `alarms` are values, too. What else is found on the valve follows the diagnosis
-    of its friction; the most severe of all sets the level.
+    The status changes only with this knowledge: it gives the time of the estimate rather than its
+    age, and nothing about the inputs. `alarms` are further values. The findings follow the
+    diagnosis of friction; the most severe of all sets the level.
     """
     diagnosis, findings = monitor.diagnosis(), by_severity(findings)
     level, signal = diagnosis.level, diagnosis.status_signal
@@ -99,9 +99,10 @@ def estimate_status(
 def _sentences(
     monitor: FrictionMonitor, diagnosis: Diagnosis, findings: Sequence[Finding]
 ) -> list[str]:
-    """Return what is said of a valve, one sentence each.
+    """Return the messages on a valve, one sentence each.
 
-    The latest identification comes first, unless a finding on the friction leads: then it is dated.
+    The latest identification comes first. If a finding on friction leads instead, the
+    identification is given with its time.
     """
     leading = [one.message for one in findings if one.leads]
     told = diagnosis.statement
@@ -120,11 +121,11 @@ def friction_status(
     findings: Sequence[Finding],
     is_watched: bool = True,
 ) -> DiagnosticStatus:
-    """Compose the status of a valve at the time `now`, ns, from what is known of it.
+    """Compose the status of a valve at the time `now`, ns, from its estimate.
 
-    Problems of the inputs, and problems of the upkeep, which leave the diagnosis valid, raise the
-    level to WARN at least. An earlier estimate is shown with its age. `more` holds further values.
-    A valve that is not watched is never told to be normal: its samples cannot be used.
+    Problems of the inputs raise the level to at least WARN, and so do problems of the upkeep, which
+    leave the diagnosis valid. An earlier estimate is shown with its age. `more` holds further
+    values. A valve whose samples are unusable is not watched, and is never reported as normal.
     """
     values = {one.key: one.value for one in estimate.values}
     level, signal = Level(estimate.level[0]), StatusSignal(values["NE 107"])
@@ -158,7 +159,7 @@ def stuck_status(name: str, hardware_id: str, problem: str) -> DiagnosticStatus:
 
 
 def fail(status: DiagnosticStatus, failures: Sequence[str]) -> None:
-    """Turn a status into that of a valve whose node fails; what it says stays behind the cause."""
+    """Turn a status into that of a failing node; its message follows the cause."""
     status.level = bytes([Level.ERROR])
     status.message = "; ".join([*failures, status.message])
     for entry in status.values:
@@ -191,14 +192,14 @@ _FIGURES = (
 
 
 _LOOKS_COST = 1e4
-"""Time between two looks for a subscriber over that of a look, which goes through the graph."""
+"""Time between two searches for a subscriber, over the duration of a search in the graph."""
 _FRICTIONS = (*UNITS, SLIDING)
 
 
 def _sweep_message(sweep: Sweep | None) -> Float64MultiArray:
-    """Table of a sweep: a row a threshold, the columns named in the label of the second axis.
+    """Return the table of a sweep: one row per threshold, columns named in the second label.
 
-    Empty for a method without a sweep, so that an older latched sweep is replaced.
+    It is empty for a method without a sweep, so that it replaces an older latched sweep.
     """
     if sweep is None:
         return Float64MultiArray()
@@ -223,10 +224,10 @@ def _sweep_message(sweep: Sweep | None) -> Float64MultiArray:
 
 
 class EstimateTopic:
-    """Publishes what is known of the valve in one message, when it has changed.
+    """Publishes all knowledge about the valve in one message whenever it changes.
 
-    It is on the graph once somebody subscribes to it. Without the parameter `estimate_topic` it
-    does nothing.
+    The publisher is created once the topic has a subscriber. Without the parameter `estimate_topic`
+    nothing is done.
     """
 
     def __init__(self, node: PolledNode, is_wanted: bool) -> None:
@@ -239,7 +240,7 @@ class EstimateTopic:
         self._look_at = -math.inf
 
     def publish(self, status: DiagnosticStatus) -> None:
-        """Publish a status, unless it is the one before."""
+        """Publish a status if it has changed."""
         if self._is_wanted and self._publisher is None:
             self._look_for_subscriber()
         if self._publisher is not None and status != self._last:
@@ -247,7 +248,7 @@ class EstimateTopic:
             self._publisher.publish(status)
 
     def _look_for_subscriber(self) -> None:
-        """Make the publisher once somebody subscribes; that costs a ten-thousandth of a core."""
+        """Create the publisher once there is a subscriber; costs a ten-thousandth of a core."""
         begun = time.monotonic()
         if begun < self._look_at:
             return
@@ -259,9 +260,9 @@ class EstimateTopic:
 
 
 class NumberTopics:
-    """Publishes a result as numbers: all with a stamp, and each on a topic of its own.
+    """Publishes a result as numbers: all in one stamped message, and each on its own topic.
 
-    The parameters `result_topic` and `number_topics` ask for them.
+    The parameters `result_topic` and `number_topics` enable them.
     """
 
     def __init__(self, node: Node) -> None:
@@ -283,7 +284,7 @@ class NumberTopics:
             self._sweep = node.create_publisher(Float64MultiArray, "~/sweep", LATCHED)
 
     def publish(self, result: Result | HistoryEntry, monitor: FrictionMonitor) -> None:
-        """Publish a result that the monitor has accepted, or the numbers kept of an earlier one."""
+        """Publish a result accepted by the monitor, or the stored numbers of an earlier result."""
         ratio = monitor.diagnosis().ratio
         unknown = float("nan")
         if isinstance(result, Result):

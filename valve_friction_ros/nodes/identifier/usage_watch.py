@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The usage of the valve: counted from the stem, kept in the history, shown, and limited."""
+"""Usage of the valve: derivation from the stem position, storage, display and limits."""
 
 import contextlib
 import math
@@ -40,16 +40,16 @@ if TYPE_CHECKING:
     from valve_friction_ros.history import HistoryFile
 
 _WRITE_EVERY = 60.0
-"""Time between two writings, s: of the stamps, or of silence. A killed node loses so much."""
+"""Time between two writes, s of the stamps or of silence. A killed node loses this time."""
 _MOST_DAYS = 62
-"""Days of this run that are held one by one."""
+"""Largest number of single days of this run in memory."""
 
 
 class UsageWatch:
-    """Counts what the valve does; satisfies `Watch`.
+    """Accumulates the usage of the valve; a `Watch`.
 
-    What this run has counted is kept under a name of its own, so that it can be written again
-    without being counted twice; what earlier runs have kept is added to it.
+    The usage of this run is stored under its own name, so that it can be rewritten without being
+    added twice. The stored usage of earlier runs is added to it.
     """
 
     def __init__(self, node: Node, monitor: FrictionMonitor, history: HistoryWriter) -> None:
@@ -69,13 +69,13 @@ class UsageWatch:
         self._total = self._since_renewal = Usage()
         self._pace: Pace | None = None
         self._warned: set[tuple[int, str, float]] = set()
-        """Packing, name and value of the limits that have warned."""
+        """Packing, name and value of each limit that has warned."""
         self.follow_parameters()
         self._add_up()
         self._remember_warnings()
 
     def follow_parameters(self) -> None:
-        """Count with the travel and the dead band in force."""
+        """Use the present travel and dead band."""
         travel = self._monitor.settings.valve.travel
         wanted = travel, float(self._node.get_parameter("counting_dead_band").value)
         if wanted == self._counted_with:
@@ -85,7 +85,7 @@ class UsageWatch:
         self._counter = UsageCounter(*wanted) if math.isfinite(travel) else None
 
     def take(self, arrivals: Arrivals) -> None:
-        """Count positions; write now and then."""
+        """Process positions, and write periodically."""
         if self._counter is None:
             return
         samples = arrivals.samples(Kind.POSITION)
@@ -99,7 +99,7 @@ class UsageWatch:
                 self._keep()
 
     def findings(self) -> Sequence[Finding]:
-        """Return the limits that are reached, or will be soon."""
+        """Return the limits that are reached or close."""
         self._gather()
         return [
             Finding(Level.WARN, StatusSignal.MAINTENANCE_REQUIRED, state.statement)
@@ -108,7 +108,7 @@ class UsageWatch:
         ]
 
     def values(self) -> Mapping[str, str]:
-        """Return the figures since the packing was renewed, and in all."""
+        """Return the usage since the packing was renewed, and the total usage."""
         self._gather()
         if time.monotonic() - self._written_at >= _WRITE_EVERY and self._unwritten:
             self._keep()
@@ -145,18 +145,18 @@ class UsageWatch:
         return values
 
     def usage(self) -> ValveUsage:
-        """Return what the valve has done, also in earlier runs."""
+        """Return the usage of the valve, including earlier runs."""
         self._gather()
         own = (UsedDay(day, renewal, one) for (renewal, day), one in self._own.items())
         earlier = () if self._earlier is None else self._earlier.days
         return ValveUsage.of((*earlier, *own), self._renewal)
 
     async def reset(self) -> str:
-        """Begin anew, as the packing is renewed; return what the old one has done."""
+        """Start afresh with a new packing; return the usage of the old packing."""
         self._gather(is_end=True)
         used, since = self._since_renewal, self._renewal
         self._renewal = now = self._node.get_clock().now().nanoseconds
-        self._add_up()  # before others see the new packing, while its renewal is written
+        self._add_up()  # before others see the new packing, during the write of its renewal
 
         def renew(file: "HistoryFile") -> None:
             self._write(file)
@@ -174,12 +174,12 @@ class UsageWatch:
         return answer
 
     def close(self) -> None:
-        """Write what is counted; the writer's thread finishes it."""
+        """Queue the usage for storage; the thread of the writer finishes this."""
         self._gather(is_end=True)
         self._keep()
 
     def limits(self) -> tuple[LimitState, ...]:
-        """Return how far the packing is from its limits; what has warned goes on warning."""
+        """Return the state of each limit of the packing; a limit that has warned stays warned."""
         now = self._node.get_clock().now().nanoseconds
         states = [
             state._replace(has_warned=(self._renewal, state.name, state.limit) in self._warned)
@@ -196,13 +196,13 @@ class UsageWatch:
         )
 
     def _remember_warnings(self) -> None:
-        """Find in earlier runs which limits have warned."""
+        """Find the limits that have warned in earlier runs."""
         warned, now = warned_limits(self.usage(), self._limits), self._renewal
         states = limit_states(Usage(), None, self._limits, now)
         self._warned |= {(now, one.name, one.limit) for one in states if one.name in warned}
 
     def _gather(self, is_end: bool = False) -> None:
-        """Add what the counter has counted; at the end also what waits there."""
+        """Add the usage of the counter, at the end including its incomplete block."""
         if self._found_late is not None and self._earlier is None:
             self._join(self._found_late)
         if self._counter is None:
@@ -216,7 +216,7 @@ class UsageWatch:
             self._since_renewal += more
 
     def _join(self, earlier: ValveUsage) -> None:
-        """Go on from earlier runs, where they could not be read at the start."""
+        """Continue from earlier runs that could not be read at the start."""
         self._earlier = earlier
         self._renewal = self._renewal or earlier.renewal
         for found in (self._own, self._unwritten):
@@ -250,12 +250,12 @@ class UsageWatch:
                 del self._own[key]
 
     def _write(self, file: "HistoryFile") -> None:
-        """Write, in the writer's thread, what this run has counted since the last writing."""
+        """Write the usage of this run since the last write, in the thread of the writer."""
         valve, rows = self._history.valve, dict(self._unwritten)
         if self._earlier is None and self._found_late is None:
             with contextlib.suppress(HistoryError):
                 self._found_late = database.read_usage(file, valve.name).condensed()
-                return  # the next writing knows the packing
+                return  # the next write knows the packing
         days = [UsedDay(day, renewal, usage) for (renewal, day), usage in rows.items()]
         database.keep_usage(file, valve, self._run, days)
         self._written = rows

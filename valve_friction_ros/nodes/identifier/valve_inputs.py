@@ -26,20 +26,20 @@ from valve_friction_ros.streams import Arrivals, Losses, Signal
 _SILENCE = 0.5
 """Time without messages, s, after which the quality of service is suspected."""
 _SELDOM = 10.0
-"""Time, s, between two looks for blocks while topics come: each goes through the whole graph."""
+"""Time between two searches for blocks while topics arrive, s: each searches the whole graph."""
 _PLAYER = "rosbag2_player"
 """Name of the node of `ros2 bag play`."""
 
 
 _LOSS_LIMIT = 1e-3
-"""Share of lost messages that is worth a warning. Chosen: single samples are interpolated, and a
-network may lose one now and then."""
+"""Share of lost messages that raises a warning. Chosen: single samples are interpolated, and a
+network may lose a message now and then."""
 _LOSS_IS_OVER = 5.0
-"""Time without a loss, s, after which losses are over."""
+"""Time without a loss, s, after which the warning ends."""
 
 
 class _Input(PolledSubscription):
-    """One topic, of which messages may be held back."""
+    """One topic, with messages that may be held back."""
 
     _held_back: Sequence[TakenMessage] = ()
 
@@ -48,13 +48,13 @@ class _Input(PolledSubscription):
         return [*held_back, *super().take(is_all)]
 
     def until(self, taken: list[TakenMessage], received: int) -> list[TakenMessage]:
-        """Return what was received until a time, ns; the rest is taken the next time."""
+        """Return the messages received until a time, ns; hold back the rest for the next time."""
         early = [one for one in taken if one.received <= received]
         self._held_back = [one for one in taken if one.received > received]
         return early
 
     def loss_problem(self) -> str | None:
-        """Say which share of the messages was lost, if it is worth a warning, else None."""
+        """Describe the loss of messages if it deserves a warning, else return None."""
         losses = self.losses
         if losses.silence > _LOSS_IS_OVER or losses.share < _LOSS_LIMIT:
             return None
@@ -75,10 +75,10 @@ class _Input(PolledSubscription):
 
 
 class ValveInputs:
-    """Takes the samples of a valve from its topics and hands them on by the block.
+    """Takes the samples of a valve from its topics and passes them on in blocks.
 
-    An empty `joint` means the first joint of a message. `drop` is told of messages of a signal's
-    topic that are no such messages.
+    An empty `joint` means the first joint of a message. `drop` is called for malformed messages on
+    the topic of a signal.
     """
 
     def __init__(
@@ -100,11 +100,11 @@ class ValveInputs:
 
     @property
     def names(self) -> StreamNames:
-        """The topics, fully resolved, and the joint."""
+        """The fully resolved topics, and the joint."""
         return StreamNames(self._pressure.watch.topic, self._stem.watch.topic, self._joint)
 
     def values(self) -> dict[str, str]:
-        """Return the values of the diagnostic: where the samples come from."""
+        """Return the values of the diagnostic: sources and losses of the samples."""
         pressure, stem, joint = self.names
         values = {"pressure_topic": pressure, "stem_topic": stem, "stem_joint": joint}
         for name, losses in self.losses().items():
@@ -113,14 +113,14 @@ class ValveInputs:
         return values
 
     def losses(self) -> dict[str, Losses]:
-        """Return the messages that were lost, by what they hold; only where there are any."""
+        """Return the lost messages by content, where there are any."""
         inputs = {"pressures": self._pressure, "positions": self._stem, "blocks": self._blocks}
         return {name: one.losses for name, one in inputs.items() if one.losses.lost}
 
     def take(self, is_all: bool = False) -> None:
-        """Take the samples that have arrived: a fair share of a turn, or `is_all` that are there.
+        """Take the samples that have arrived: a fair share per turn, or all with `is_all`.
 
-        Where one signal has more than its share, the other waits for it.
+        If one signal exceeds its share, the other waits for it.
         """
         pressures, stems = self._pressure.take(is_all), self._stem.take(is_all)
         taken = ((self._pressure, pressures), (self._stem, stems))
@@ -147,9 +147,10 @@ class ValveInputs:
         return found
 
     def follow_publishers(self) -> None:
-        """Take from best-effort and from reliable publishers; to be called now and then.
+        """Adapt to best-effort and reliable publishers; call this periodically.
 
-        While blocks come nobody is asked for topics: the middleware looks through its whole graph.
+        While blocks arrive the other topics are not checked, because each check searches the whole
+        graph.
         """
         if self._blocks.watch.silence() <= _SILENCE:
             return
@@ -162,7 +163,7 @@ class ValveInputs:
             self._blocks.follow()
 
     def is_played(self) -> bool:
-        """Return whether a recording is played on the topics in use; it asks the middleware."""
+        """Return whether a recording is replayed on the topics in use, from the middleware."""
         return any(
             publisher.node_name == _PLAYER
             for one in self._used()
@@ -170,7 +171,7 @@ class ValveInputs:
         )
 
     def _take_blocks(self, blocks: Sequence[Float64MultiArray]) -> None:
-        """Hand all blocks on together: each look at samples costs as much as a thousand of them."""
+        """Pass on all blocks together: each call costs as much as a thousand samples."""
         try:
             arrivals = rows_of(blocks)
         except ValueError as error:
@@ -184,9 +185,9 @@ class ValveInputs:
             self._hand_on(arrivals)
 
     def problems(self, timeout: float) -> list[str]:
-        """Say what is wrong with the inputs if nothing has come for `timeout` seconds.
+        """Describe the problems of the inputs, such as silence for `timeout` seconds.
 
-        A valve that is fed by blocks needs no topics, and one that has topics needs no blocks.
+        A valve needs either blocks or the two topics of samples, not both.
         """
         found = [] if self._bad_block is None else [self._bad_block]
         problems = [one.watch.problem(timeout) for one in self._used()]
@@ -194,7 +195,7 @@ class ValveInputs:
         return found + [problem for problem in problems if problem is not None]
 
     def _used(self) -> tuple[_Input, ...]:
-        """Return the blocks where the last samples came in them, or only they are offered."""
+        """Return the blocks if the last samples came in blocks or only blocks are offered."""
         topics, blocks = (self._pressure, self._stem), self._blocks.watch
         since_topics = min(one.watch.silence() for one in topics)
         is_fed_by_blocks = blocks.silence() <= since_topics and blocks.is_used()

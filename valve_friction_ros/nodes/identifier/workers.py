@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The threads that the identifiers of one process share, and the identifications in them."""
+"""Threads shared by the identifiers of one process, and the identifications in them."""
 
 import contextlib
 import time
@@ -36,17 +36,17 @@ from valve_friction_ros.nodes.plumbing.processes import Processes, ThisProcess
 from valve_friction_ros.nodes.plumbing.worker import InternalError, Worker, bugs_reported, done_in
 
 _AT_ONCE = 2
-"""Identifications at once: a long record of one valve does not keep the others waiting."""
+"""Number of parallel identifications: a long record of one valve must not block the others."""
 
 _LONG = 1.0
-"""Time, s, from which a writing that has failed was a wait. Chosen: others fail at once."""
+"""Time, s, from which a failed write has been waiting for a lock. Chosen: others fail at once."""
 
 
 class HistoryThread(Worker):
     """The thread that writes the histories of all valves of a process.
 
-    A file that somebody locks is waited for once: what was asked for before the end of the wait
-    fails with it, and is tried again with what comes next.
+    The thread waits only once for a locked file: writes requested before the end of this wait fail
+    with it, and are retried with the next change.
     """
 
     def __init__(self) -> None:
@@ -55,9 +55,9 @@ class HistoryThread(Worker):
 
     @contextlib.contextmanager
     def writing(self, path: Path, asked: float) -> Iterator[None]:
-        """Write to a file, as was asked for at a time of the monotonic clock, s.
+        """Guard a write to a file, requested at `asked`, s of the monotonic clock.
 
-        Raises HistoryError if a wait for this file has failed since.
+        Raises HistoryError if a wait for this file has failed since then.
         """
         begun = time.monotonic()
         ended, error = self._waits.get(path, (asked, None))
@@ -73,10 +73,10 @@ class HistoryThread(Worker):
 
 
 class Workers(NamedTuple):
-    """What all valves of a process share.
+    """Resources shared by all valves of a process.
 
-    Threads that identify, write bags and reports, combine moves, keep, and send alerts; what
-    gathers their alarms for one letter a day; and `apart`, which does what holds much memory:
+    They are the threads that identify, write bags and reports, combine moves, write the history and
+    send alerts; the daily digest of alarms; and `apart`, which runs work that needs much memory:
     identifications and pages.
     """
 
@@ -91,12 +91,12 @@ class Workers(NamedTuple):
 
 @contextlib.contextmanager
 def running_workers(processes: int = 0) -> Iterator[Workers]:
-    """Provide the threads; at the end, tasks that still wait are dropped.
+    """Provide the threads; tasks that still wait at the end are dropped.
 
     Parameters
     ----------
     processes : int
-        Most processes that identify at once; 0: threads of this one.
+        Largest number of processes that identify in parallel; 0: threads of this process.
     """
     apart = Processes() if processes else ThisProcess()
 
@@ -123,10 +123,10 @@ def running_workers(processes: int = 0) -> Iterator[Workers]:
 
 
 class Identification:
-    """Identifies what the monitor's buffer holds, and publishes the result.
+    """Identifies the buffer of the monitor, and publishes the result.
 
-    The worker gets a copy of the buffer. Its callback awaits the result, so the executor's thread
-    alone touches the monitor.
+    The worker gets a copy of the buffer. The callback awaits the result, so only the thread of the
+    executor accesses the monitor.
     """
 
     def __init__(
@@ -139,9 +139,9 @@ class Identification:
         self._came = [0, 0]
 
     def follow(self) -> None:
-        """Note when usable samples of either signal have come, by the node's clock.
+        """Record when usable samples of either signal arrived, by the clock of the node.
 
-        Stamps tell no age: those of a bag that is played without its clock are of another day.
+        Stamps do not give their age: a bag replayed without its clock has stamps of another day.
         """
         now = self._node.get_clock().now().nanoseconds
         last_stamps = self._monitor.buffer.last_stamps
@@ -151,7 +151,7 @@ class Identification:
         self._last_stamps = last_stamps
 
     def _require_recent(self) -> None:
-        """Refuse a record of which a signal has ended longer ago than it may be silent."""
+        """Refuse a record if one of its signals has been silent for longer than permitted."""
         longest = max(
             self._monitor.settings.window, self._node.get_parameter("input_timeout").value
         )
@@ -170,12 +170,12 @@ class Identification:
 
     @property
     def has_nothing_new(self) -> bool:
-        """Whether no sample has come since the last identification."""
+        """Whether no sample has arrived since the last identification."""
         newest = self._monitor.buffer.newest_stamp
         return not self._is_running and newest is not None and newest == self._until
 
     def record(self) -> IdentificationInput:
-        """Copy the buffer, to be identified.
+        """Copy the buffer for an identification.
 
         Raises RefusalError if an identification is running.
         """
@@ -185,11 +185,11 @@ class Identification:
         return self._monitor.input()
 
     async def run(self, record: IdentificationInput) -> None:
-        """Identify a record in the worker; take over and publish the result.
+        """Identify a record in the worker; adopt and publish the result.
 
-        Raises RefusedRecordError if the record cannot be identified or is old, InternalError if a
-        bug is met; the monitor shows the bug until an identification succeeds. What a refused
-        record shows of the valve is taken over, too.
+        Raises RefusedRecordError if the record cannot be identified or is old, InternalError for a
+        bug, which the monitor reports until an identification succeeds. The findings of a refused
+        record are adopted too.
         """
         self._require_recent()
         self._is_running = True
@@ -219,9 +219,9 @@ class Identification:
 
 
 class Schedule:
-    """Calls for an identification by the node's clock, and remembers why the last was skipped.
+    """Starts identifications by the clock of the node, and remembers why the last was skipped.
 
-    A skip changes neither diagnosis nor level, and it is not logged. `group` is reentrant, so that
+    A skip changes neither diagnosis nor level, and is not logged. `group` is reentrant, so that
     other callbacks run while an identification is awaited.
     """
 
@@ -237,7 +237,7 @@ class Schedule:
         self.follow()
 
     def follow(self) -> None:
-        """Follow the parameter."""
+        """Follow the parameter `period`."""
         period = self._node.get_parameter("period").value
         if period == self._period:
             return
@@ -251,15 +251,15 @@ class Schedule:
         self._period, self._skip = period, None
 
     def skip(self, reason: str) -> None:
-        """Remember that nothing was identified, and why.
+        """Remember why an identification was skipped.
 
-        What began before the schedule ended may end after it, and does not count.
+        A run that began before the schedule was switched off may end later, and is ignored.
         """
         if self._timer is not None:
             self._skip = reason, self._node.get_clock().now().nanoseconds
 
     def stall(self) -> None:
-        """Remember that nothing new has come; an older reason for a skip still holds."""
+        """Remember that there are no new samples, unless there is an older reason for a skip."""
         if self._skip is None:
             self.skip("no new samples since the last identification")
 
@@ -268,7 +268,7 @@ class Schedule:
         self._skip = None
 
     def values(self) -> dict[str, str]:
-        """Return the values of the diagnostic for the last skip, if there was any."""
+        """Return the values of the diagnostic for the last skip, if any."""
         if self._skip is None:
             return {}
         reason, stamp = self._skip
