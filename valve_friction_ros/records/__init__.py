@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Recordings in files, CSV and bags, and the valve file that describes them; no ROS."""
+"""Recordings in tables and bags, and the valve file that describes them; no ROS."""
 
 from typing import TYPE_CHECKING
 

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""How a table of samples is written: its columns, their units, and its layout."""
+"""Format of a table of samples: columns, units and layout."""
 
 import codecs
 import math
@@ -34,10 +34,10 @@ KNOWN_UNITS: Mapping[str, tuple[str, ...]] = {
     "pressure": (*PRESSURE_UNITS, *SHARES),
     "force": (*FORCE_UNITS,),
 }
-"""Names of the units in which a column may be."""
+"""Names of the permitted units by quantity."""
 
 _DELIMITERS = {"tab": "\t", "\\t": "\t", "comma": ",", "semicolon": ";", "space": " "}
-"""What people type for characters that a shell makes hard to type."""
+"""Names for characters that are hard to type in a shell."""
 
 
 def _described(default: Any, text: str, metavar: str = "") -> Any:
@@ -50,13 +50,13 @@ def _units(quantity: str) -> str:
 
 @dataclass(frozen=True)
 class Columns:
-    """What is said of a table that it does not tell itself, in the words of the options.
+    """Information that a table does not contain itself, by the names of the options.
 
-    The same words are the keys of the section ``columns:`` of a valve file. What is empty is
-    recognized from the table. Units are those of `records.units`; a column that is named here, and
-    whose unit nobody says, is in its SI unit where its numbers may be.
+    The same names are the keys of the section ``columns:`` of a valve file. Empty fields are
+    recognized from the table. Units are those of `records.units`. A column that is named here
+    without a unit is in its SI unit if its numbers permit this.
 
-    Raises ValueError, which names the word, if a value is impossible.
+    Raises ValueError, which names the field, if a value is impossible.
     """
 
     time_column: str = _described("", "header of the time", "HEADER")
@@ -167,9 +167,9 @@ class Columns:
 
     @classmethod
     def section(cls, content: object) -> "Columns":
-        """Build it from the section ``columns:`` of a valve file.
+        """Build the columns from the section ``columns:`` of a valve file.
 
-        Raises ValueError, which names the key, for one that is unknown or impossible.
+        Raises ValueError, which names the key, for an unknown key or an impossible value.
         """
         if not isinstance(content, Mapping):
             raise ValueError("columns must be lines such as 'time_column: Time'")
@@ -186,7 +186,7 @@ class Columns:
 
 
 def _of_kind(key: str, value: object, kind: type) -> Any:
-    """Return a value of YAML as `kind`; a header may be a number, and a number a whole one."""
+    """Convert a YAML value to `kind`; a header may be a number, and a float an integer."""
     if kind is str and isinstance(value, (str, int, float)) and not isinstance(value, bool):
         return str(value)
     if kind is float and isinstance(value, int) and not isinstance(value, bool):

@@ -7,10 +7,10 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Files and folders: those of nodes, one that is written whole, and those in object stores.
+"""Files and folders: the data folder, atomic writes, and object stores.
 
-A file in a store is named as fsspec names it: ``s3://bucket/folder``. Keys and addresses of the
-stores are fsspec's own business: its variables of the environment, and its files of configuration.
+A file in a store has an fsspec name, such as ``s3://bucket/folder``. fsspec takes keys and
+addresses of the stores from its own environment variables and configuration files.
 """
 
 import contextlib
@@ -25,9 +25,9 @@ from valve_friction_ros.identification.refusal import RefusalError
 
 
 def data_folder() -> Path:
-    """Return the package's folder under ROS_HOME, or under ~/.ros without it.
+    """Return the folder of the package under ROS_HOME, by default under ~/.ros.
 
-    Where the home directory is not known, the path begins with ``~``.
+    If the home directory is unknown, the path begins with ``~``.
     """
     home = os.environ.get("ROS_HOME") or Path("~/.ros")
     folder = Path(home) / "valve_friction_ros"
@@ -42,10 +42,9 @@ def history_file() -> Path:
 
 
 def write_whole(path: Path, content: bytes) -> None:
-    """Write a file; a failure leaves no part of it, and keeps what was there before.
+    """Write a file completely or not at all; a failure keeps the previous file.
 
-    A link stays a link, a device or a pipe is written to as it is. Raises OSError, which names
-    `path`.
+    A link stays a link; devices and pipes are written directly. Raises OSError, which names `path`.
     """
     place = path.resolve()
     is_special = place.exists() and not place.is_file()
@@ -58,37 +57,37 @@ def write_whole(path: Path, content: bytes) -> None:
         raise OSError(error.errno, error.strerror, str(path)) from None
     finally:
         if not is_special:
-            with contextlib.suppress(OSError):  # a read-only folder holds no draft
+            with contextlib.suppress(OSError):  # a read-only folder has no draft
                 draft.unlink(missing_ok=True)
 
 
 def unpacked_name(name: str) -> str:
-    """Return the name of a file as it is when it is unpacked."""
+    """Return the name of a file without the ending of its compression."""
     return re.sub(r"\.(gz|zstd)\Z", "", name, flags=re.IGNORECASE | re.ASCII)
 
 
 def table_stem(path: Path) -> str:
-    """Return the name of a file without folders and endings, packed or not: its tag, perhaps."""
+    """Return the name of a file without folders and endings; it may be the tag of a valve."""
     return Path(unpacked_name(path.name)).stem
 
 
 def cause_of(error: Exception) -> str:
-    """Return the system's words for an error of its own; else the error's."""
+    """Return the message of the system for a system error, else the message of the error."""
     return str((isinstance(error, OSError) and error.strerror) or error)
 
 
 _REMEDY = "S3 needs `pip install s3fs 'universal_pathlib>=0.3.10,<0.4'` (the extra `stores`)"
 _LONGEST_CAUSE = 200
 _MARKS = ("ETag", "etag", "md5Hash", "mtime", "LastModified", "last_modified", "created")
-"""What stores say of a file that changes with its content; the first that is there counts."""
+"""Metadata of stores that change with the content of a file; the first one present is used."""
 
 
 def place(name: str) -> Path:
-    """Return the path of a file or folder on this machine, or in a store where the name has ://.
+    """Return the path of a file or folder on this machine, or in a store if the name has ://.
 
-    The latter is a ``UPath`` of universal_pathlib, which does for these rooms what a `Path` does.
+    The latter is a ``UPath`` of universal_pathlib, which serves here like a `Path`.
 
-    Raises ValueError if the store is not known, or its library is not installed.
+    Raises ValueError if the store is unknown or its library is not installed.
     """
     if "://" not in name:
         return Path(name)
@@ -112,7 +111,7 @@ def _is_stored(path: object) -> bool:
 
 @contextlib.contextmanager
 def explained(path: object) -> Iterator[None]:
-    """Make what the library of a store raises about a path a ValueError of one line."""
+    """Convert exceptions of the library of a store to a ValueError of one line."""
     try:
         yield
     except (ValueError, RefusalError):
@@ -128,12 +127,12 @@ def _below(folder: Any) -> Iterator[tuple[Path, list[str], list[str]]]:
     root = folder.path.rstrip("/")
     for where, folders, files in folder.fs.walk(folder.path, on_error="raise"):
         inner = where.rstrip("/")[len(root) :].strip("/")
-        files[:] = [name for name in files if name]  # stores hold a folder as a file without a name
+        files[:] = [name for name in files if name]  # stores list a folder as a file without a name
         yield folder / inner if inner else folder, folders, files
 
 
 def walk(folder: Path) -> Iterator[tuple[Path, list[str], list[str]]]:
-    """Go through a folder and those below it, as `os.walk` does; what leaves the list is left out.
+    """Walk through a folder and its subfolders, as `os.walk` does; names may be removed to prune.
 
     Raises ValueError if a folder cannot be read.
     """
@@ -151,7 +150,7 @@ def walk(folder: Path) -> Iterator[tuple[Path, list[str], list[str]]]:
 def state_of(file: Path) -> str:
     """Return the size of a file, and a mark that changes with its content.
 
-    Raises OSError if it cannot be looked at.
+    Raises OSError if the file is not accessible.
     """
     if not _is_stored(file):
         state = file.stat()
@@ -163,7 +162,7 @@ def state_of(file: Path) -> str:
 
 
 def _fetch(path: Any, copy: Path) -> None:
-    """Copy a stored file, or the files of a stored folder; those in folders below it stay there."""
+    """Copy a stored file, or the files of a stored folder without its subfolders."""
     if path.fs.isdir(path.path):
         copy.mkdir()
         listed = path.fs.ls(path.path, detail=True)
@@ -176,10 +175,10 @@ def _fetch(path: Any, copy: Path) -> None:
 
 @contextlib.contextmanager
 def on_disk(path: Path) -> Iterator[Path]:
-    """Have a file, or the files of a folder, on this machine's disk: as it is, or as a copy.
+    """Provide a file, or the files of a folder, on the local disk, as a copy if necessary.
 
-    The copy has the same name; an error that leaves the block names the original. Raises ValueError
-    if it cannot be fetched.
+    The copy has the same name; errors raised in the block name the original. Raises ValueError if
+    it cannot be fetched.
     """
     if not _is_stored(path):
         yield path

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""What headers, tags and cells say: a quantity, its unit and its valve; a number, its unit."""
+"""Interpretation of headers, tags and cells: quantity, unit and valve; number and unit."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -50,18 +50,18 @@ _OTHER_WORDS = (
 )
 _STRONG_WORDS = "actuator diaphragm stelldruck antriebsdruck stem valve actual ist ventil"
 _OTHER = frozenset(_OTHER_WORDS.split())
-"""Words of signals that are neither the actuator's nor the stem's."""
+"""Words for signals that belong neither to the actuator nor to the stem."""
 _STRONG = frozenset(_STRONG_WORDS.split())
-"""Words that speak of the actuator or of the stem itself."""
+"""Words that refer directly to the actuator or the stem."""
 _ISA = re.compile(r"(?P<unit>\d*)(?P<letters>pi?t|pi|zi?t|zi|gi?t)(?P<loop>\d+[a-z]?)?")
-"""Letters of instruments by ISA 5.1: pressure, position (Z), gauge of position (G)."""
+"""Instrument letters of ISA 5.1: pressure, position (Z), position gauge (G)."""
 _CAMEL = re.compile(r"(?<=[a-zäöü])(?=[A-ZÄÖÜ])|(?<=[A-Z])(?=[A-Z][a-zäöü])")
 _BRACKETS = re.compile(r"[\[({<]([^\])}>]*)[\])}>]")
 _LAST = re.compile(r"(?P<mark>\s+in\s+|\s*/\s*|_|[\s,:]+)(?P<unit>[^\s_/,:]+)\s*$")
 _VAGUE = frozenset(("in", "h", "d", "m", "s", "n", "pu"))
-"""Units that as the last word of a header, without a mark before them, may be something else."""
+"""Units that may mean something else as the last word of a header, without a mark before them."""
 _IDLE = frozenset(["pv", "x", "t", "state", "fluid", "msg", "data"])
-"""Words that name neither a quantity nor a valve."""
+"""Words that denote neither a quantity nor a valve."""
 
 UNITS: dict[str, Mapping[str, Unit]] = {
     "time": {name: Unit(size, 1e9) for name, size in NANOSECONDS.items()},
@@ -73,19 +73,19 @@ _KNOWN = {*SHARES}.union(*UNITS.values())
 
 
 class Named(NamedTuple):
-    """What a header or a tag says.
+    """Meaning of a header or a tag.
 
     Attributes
     ----------
     quantity : str
         ``time``, ``position``, ``pressure``, ``force``, ``command``, ``quality``, ``tag``,
-        ``value``, ``unit``, ``other``, or nothing.
+        ``value``, ``unit``, ``other``, or empty.
     unit : str
-        As `records.units` calls it, or nothing.
+        Name of the unit in `records.units`, or empty.
     label : str
-        What is left of the name: the valve.
+        Rest of the name: the valve.
     is_strong : bool
-        Whether it speaks of the actuator or the stem itself.
+        Whether it refers directly to the actuator or the stem.
     """
 
     quantity: str
@@ -95,12 +95,12 @@ class Named(NamedTuple):
 
 
 def plain_name(text: str) -> str:
-    """Return the letters and digits of a name, whatever their case."""
+    """Return the letters and digits of a name in lower case."""
     return "".join(filter(str.isalnum, text.casefold()))
 
 
 def known_unit(text: str) -> str:
-    """Return the unit that a text is, or nothing."""
+    """Return the unit named by a text, or ''."""
     unit = unit_named(text)
     return unit if unit in _KNOWN else ""
 
@@ -125,21 +125,21 @@ _JOINT_MESSAGE = re.compile(r"/.*/position(?:[/.\[]\w+\]?)?|/.*state.*[/.]positi
 
 
 def _of_message(name: str) -> str:
-    """Return the unit of a field of a ROS message, which has an SI unit: it begins with a topic."""
+    """Return the SI unit of a field of a ROS message, whose name begins with a topic, or ''."""
     if _PRESSURE_MESSAGE.fullmatch(name):
         return "Pa"
     return "m" if _JOINT_MESSAGE.fullmatch(name) else ""
 
 
 def named(texts: Sequence[str], unit_cell: str = "") -> Named:
-    """Say what the header of a column means, by all rows of the header and its row of units."""
+    """Interpret the header of a column from all rows of the header and its row of units."""
     unit, rest = _of_message(texts[0]), []
     for text in texts:
         own, without = _unit_and_rest(text.strip())
         unit = unit or own
         rest.append(without)
     unit = known_unit(unit_cell) or unit
-    if texts[0].strip().casefold() == "x_value":  # LabVIEW's seconds
+    if texts[0].strip().casefold() == "x_value":  # seconds of LabVIEW
         return Named("time", unit or "s")
     words = [
         word.casefold() for word in re.split(r"[^\w]+|_", _CAMEL.sub(" ", " ".join(rest))) if word
@@ -170,7 +170,7 @@ def named(texts: Sequence[str], unit_cell: str = "") -> Named:
 
 
 def _quantity(found: Sequence[str], unit: str, words: Sequence[str]) -> str:
-    """Choose the quantity: by the unit where only one has it, else by the words."""
+    """Choose the quantity: by the unit if only one quantity has it, else by the words."""
     of_unit = next((name for name, units in UNITS.items() if unit in units), "")
     for name in ("other", "quality", "command"):
         if name in found and not (name == "quality" and unit):
@@ -191,7 +191,7 @@ def _quantity(found: Sequence[str], unit: str, words: Sequence[str]) -> str:
 
 
 _LONGEST = 60
-"""Characters of a number with its unit. Chosen: beyond any."""
+"""Most characters of a number with its unit. Chosen: beyond any real one."""
 
 
 @lru_cache
@@ -208,7 +208,7 @@ def _pattern(decimal: str) -> re.Pattern[str]:
 
 @lru_cache(maxsize=4096)
 def number_and_unit(text: str, decimal: str) -> tuple[float, str] | None:
-    """Read a number, with its unit if there is one; None if it is none.
+    """Read a number with an optional unit; return None if the text is not a number.
 
     Of comma and point, the one that is not the `decimal` mark separates thousands.
     """
@@ -228,7 +228,7 @@ def number_and_unit(text: str, decimal: str) -> tuple[float, str] | None:
 
 
 def numbers(texts: Sequence[str], decimal: str, unit: str) -> NDArray[np.float64]:
-    """Read numbers in `unit`, shape (n,); nan stands for what is none."""
+    """Read numbers in `unit`, shape (n,); other texts become nan."""
     together = "".join(texts)
     plain = texts
     if decimal == "," and "." not in together:

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""A table as it is seen at first, and how it is to be read: signals, times, marks, questions."""
+"""First look at a table, and its layout: signals, times, delimiters and open questions."""
 
 import itertools
 import re
@@ -27,36 +27,36 @@ from valve_friction_ros.records.written_times import TimeForm, is_date, is_day, 
 _NAMES = {"\t": "tab", ";": "semicolon", ",": "comma", "|": "bar", " ": "blanks"}
 _MOST_LABELS = 6
 LONGEST_QUOTE = 40
-"""Characters of a name in a message. Chosen: the message stays on one line."""
+"""Most characters of a name in a message. Chosen: the message stays on one line."""
 OWN = {"time": "time_s", "position": "position_m", "pressure": "pressure_pa", "force": "force_n"}
-"""Headers of this package, in its own units."""
+"""Headers of tables written by this package, in its own units."""
 
 
 def quoted(text: str) -> str:
-    """Return a text in quotes, and not more of it than a message has room for."""
+    """Return a text in quotes, shortened to fit into a message."""
     return repr(text if len(text) <= LONGEST_QUOTE else f"{text[:LONGEST_QUOTE]}…")
 
 
 @dataclass(frozen=True)
 class TableSignal:
-    """A signal of a table: where its values, times and qualities are.
+    """Location of a signal in a table: its values, times and qualities.
 
     Attributes
     ----------
     quantity : str
         ``position``, ``pressure`` or ``force``.
     name : str
-        Header, or tag where each row is one value.
+        Header, or tag if each row has one value.
     unit : str
-        Of its numbers.
+        Unit of the values.
     place : int
-        SeenColumn of its values.
+        Column of the values.
     time : tuple of int
-        SeenColumn of its times, or of days and times of the day.
+        Column of the times, or columns of days and times of day.
     quality : int or None
-        SeenColumn of its qualities.
+        Column of the qualities.
     path : Path
-        Its file.
+        File of the table.
     """
 
     quantity: str
@@ -70,39 +70,39 @@ class TableSignal:
 
 @dataclass(frozen=True, eq=False)
 class Layout:
-    """How a table is to be read.
+    """Instructions for reading a table.
 
     Attributes
     ----------
     raw : RawTable
-        Its cells.
+        The cells of the table.
     form : Columns
-        What was said and what was found: with it the next table is read alike.
+        Given and recognized format: with it the next table is read in the same way.
     headers : tuple of str
         Names of all columns.
     first, above : int
-        Row of the first values as a spreadsheet counts, and the number of lines above it.
+        Row of the first values, numbered as in a spreadsheet, and the number of lines above it.
     valves : mapping of str to tuple of TableSignal
-        The signals of each valve: what drives it, its position, and the opposing pressure if it
-        has one. The name of an only valve is empty.
+        The signals of each valve: its drive, its position, and the opposing pressure if it has one.
+        The name of a single valve is empty.
     times : mapping of tuple of int to TimeForm
-        How the times of the columns are written.
+        Formats of the times by their columns.
     tag_place : int or None
-        SeenColumn of the tags where each row is one value.
+        Column of the tags if each row has one value.
     good : mapping of int to callable
-        Tells good qualities by their column.
+        Functions that recognize good qualities, by column.
     decimal : str
-        Decimal mark of its numbers.
+        Decimal mark.
     texts : tuple of str
-        All that stands above the values, and the tags: what may name the valve.
+        All texts above the values, and the tags: they may name the valve.
     kinds : mapping of str to str
-        What each column was taken for, by its header.
+        Recognized kind of each column, by header.
     questions : tuple of str
-        What the table leaves open, each with the option that settles it.
+        Open questions on the table, each with the option that answers it.
     unclear : mapping of str to str
-        Of a file that holds a part of a valve's signals: what may be one of them, and its unit.
+        Columns that may be a signal, with units, in a file with some signals of a valve.
     beside : tuple of Layout
-        The layouts of the other files of the valve.
+        Layouts of the other files of the valve.
     """
 
     raw: RawTable
@@ -123,7 +123,7 @@ class Layout:
 
     @property
     def is_own(self) -> bool:
-        """True for a table in the words of this package, of which nothing need be said."""
+        """Whether the table has the headers of this package and needs no explanation."""
         names = [signal.name for signals in self.valves.values() for signal in signals]
         return (
             set(names) <= set(OWN.values())
@@ -135,7 +135,7 @@ class Layout:
 
     @cached_property
     def words(self) -> str:
-        """Return in one line how the table is read."""
+        """Describe in one line how the table is read."""
         files = (self, *self.beside)
         parts = [f"{len(files)} files of a valve"] if self.beside else []
         parts += dict.fromkeys(word for one in files for word in one._form_words())  # noqa: SLF001
@@ -180,15 +180,15 @@ def _in_unit(unit: str) -> str:
 _DELIMITERS = ("\t", ";", ",", "|", " ")
 _MOST_HEADER_ROWS = 8
 _TYPES = ("#TYPES", "#ROWS", "#datatype", "#group", "#default")
-"""Beginnings of rows above the headers, of Ignition and InfluxDB, that name none."""
+"""Prefixes of rows of Ignition and InfluxDB above the headers, which contain no headers."""
 _MOST_NAMES = 20
 _FILE_TIME = 116_444_736_000_000_000
-"""1970 in the time of Windows, 100 ns since 1601."""
+"""Start of 1970 in Windows time, 100 ns since 1601."""
 
 
 @dataclass
 class SeenColumn:
-    """A column while it is looked at."""
+    """A column during recognition."""
 
     place: int
     name: str
@@ -203,7 +203,7 @@ class SeenColumn:
 
 
 class Look:
-    """Looks at the first rows of a table."""
+    """Analyses the first rows of a table."""
 
     def __init__(self, raw: RawTable, form: Columns) -> None:
         self.raw, self.form = raw, form
@@ -217,7 +217,7 @@ class Look:
         self.start = self._start()
         self.columns = self._columns()
 
-    # What separates the cells, and the decimals.
+    # Delimiter and decimal mark
 
     def _found_marks(self) -> tuple[str, str]:
         if not self.raw.is_text:
@@ -242,13 +242,13 @@ class Look:
         return decimal, delimiter
 
     def _of_headers(self) -> str:
-        """Return the mark that splits the first line most often, where no row has values."""
+        """Return the delimiter that splits the first line most often, for rows without values."""
         line = next(filter(str.strip, self.raw.head))
         counts = {mark: line.count(mark) for mark in _DELIMITERS[:-1]}
         return max(counts, key=lambda mark: counts[mark]) if any(counts.values()) else ","
 
     def _decimal_of_even(self, delimiter: str) -> str:
-        """Return the decimal mark where every number could be of either; ask if it matters."""
+        """Return the decimal mark if both are possible for every number; ask if it matters."""
         cells = [cell for _, row in self.raw.rows(delimiter) for cell in row]
         commas = [cell for cell in cells if re.fullmatch(r"\s*-?\d{1,3}(,\d{3})+\s*", cell)]
         if not commas:
@@ -261,10 +261,10 @@ class Look:
         )
         return "."
 
-    # Where the values begin, and what stands above them.
+    # First row of values, and the rows above it
 
     def _start(self) -> int:
-        """Return the index of the first row of values, below all rows without."""
+        """Return the index of the first row of values, below all rows without values."""
         rows = [row for _, row in self.rows]
         lower = rows[len(rows) // 2 :] if len(rows) > 3 else rows
 
@@ -290,10 +290,10 @@ class Look:
         return begin
 
     def _paired_headers(self) -> list[list[str]]:
-        """Return the headers where each channel has two columns, as in TwinCAT Scope; else none.
+        """Return the headers of a table with two columns per channel (TwinCAT Scope), else none.
 
-        Above the milliseconds of a channel are the words for what is above its values: ``Name``,
-        ``Unit``. The beginning of the export is given as 100 ns since 1601.
+        The column of the milliseconds of a channel has labels such as ``Name`` and ``Unit`` for the
+        entries above its values. The start of the export is given in 100 ns since 1601.
         """
         found: dict[str, list[str]] = {}
         for place, (line, row) in enumerate(self.rows):
@@ -382,22 +382,22 @@ class Look:
 
     @property
     def above(self) -> int:
-        """Number of lines above the values."""
+        """The number of lines above the values."""
         return self.rows[self.start - 1][0] if self.start else 0
 
     @property
     def names(self) -> str:
-        """The first names of columns, for a question."""
+        """The names of the first columns, for a question."""
         names = [column.name[:LONGEST_QUOTE] or "''" for column in self.columns[:_MOST_NAMES]]
         return ", ".join(names)
 
     def of_kind(self, kind: str, quantity: str | None = None) -> list[SeenColumn]:
-        """Return the columns of a kind, or those of them whose names speak of a quantity."""
+        """Return the columns of a kind, optionally only those whose names denote a quantity."""
         found = [column for column in self.columns if column.kind == kind]
         return [one for one in found if quantity is None or one.said.quantity == quantity]
 
     def by_name(self, name: str, option: str) -> SeenColumn | None:
-        """Return the column of a name that was given; ask again if there is none, or two."""
+        """Return the first column with a given name; ask again if there is none."""
         found = [column for column in self.columns if column.name == name]
         if found:
             return found[0]
@@ -407,7 +407,7 @@ class Look:
 
 
 def _names(row: Sequence[str]) -> list[str]:
-    """Return the headers in a row; numpy and others put a # before the first."""
+    """Return the headers in a row; numpy and others put a # before the first header."""
     names = [cell.strip()[:1000] for cell in row]
     if names[:1] == ["#"]:
         return names[1:]
@@ -415,7 +415,7 @@ def _names(row: Sequence[str]) -> list[str]:
 
 
 def _with_groups(names: list[str], above: Sequence[Sequence[str]]) -> list[str]:
-    """Put the merged cells of a row above, as valves over their signals, before repeated names."""
+    """Prefix repeated names with merged cells above them, such as a valve above its signals."""
     for row in reversed(above):
         groups: list[str] = []
         for cell in row:
@@ -434,7 +434,7 @@ def _is_value(cell: str, decimal: str) -> bool:
 
 
 def _are_units(row: Sequence[str]) -> bool:
-    """Return whether a row holds units: of most of its cells beside those of times and remarks."""
+    """Return whether most cells of a row are units, apart from those of times and remarks."""
     cells = [cell for cell in row if cell.strip()]
     known = sum(bool(known_unit(cell)) for cell in cells)
     return known > 0 and 2 * known >= len(cells) - 1

@@ -7,9 +7,10 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""What a table is: its times, units, valves and qualities, found before it is read.
+"""Recognition of the times, units, valves and qualities of a table before it is read.
 
-What is ambiguous is asked for, all at once, with the option that settles it.
+Everything ambiguous becomes a question; all are asked at once, each with the option that answers
+it.
 """
 
 import re
@@ -44,31 +45,32 @@ from valve_friction_ros.records.written_times import (
 
 _MOST_CHOICES, _MOST_TAGS = 6, 10_000
 _COARSE = 0.5
-"""Steps of a time without a unit that are seconds; larger ones may be milliseconds. Chosen."""
+"""Largest step of a time without a unit that is in seconds; others may be milliseconds. Chosen."""
 _GOOD = re.compile(r"(good|ok|gut|valid|true|g|yes|ja|gültig)\b.*|\(?good\b.*", re.IGNORECASE)
 _OPC_GOOD, _OPC_MOST, _CERTAIN = 192, 255, 100
-"""Qualities of OPC from good on, and the confidence of a historian in a value that was measured."""
+"""Range of good OPC qualities, and the confidence of a historian in a measured value."""
 
 _MILLISECONDS = re.compile(r"milli\w*|m ?sec|ms|sub ?sec\w*", re.IGNORECASE)
-"""Headers of the milliseconds beside a time of the day."""
+"""Headers of a column of milliseconds next to a time of day."""
 
 _LONGEST_TRAVEL, _LEAST_PRESSURE = 0.5, 2e3
-"""Of a stem, m, and of an actuator that moves, Pa: no percentage is below, no bar and no kPa above.
+"""Longest travel of a stem, m, and least pressure of a moving actuator, Pa: a percentage is not
+below the former, a pressure in bar or kPa not above the latter.
 
-A column that is named without a unit is in its SI unit, as files of earlier versions mean it."""
+A column that is named without a unit is in its SI unit, as in files of earlier versions."""
 
 _LOCAL = ("d", "microdays")
-"""Units of clocks that count days: they are local, as those of spreadsheets are."""
+"""Units of clocks that count days: they are in local time, as in spreadsheets."""
 
 _UNCLEAR = ("", "value", "command")
-"""What the name of a column says that may be the pressure or the position all the same."""
+"""Named quantities of a column that may still be the pressure or the position."""
 
 _Candidate = tuple[str, Named, int]
-"""Name, what it says, and column of what may be a signal."""
+"""Name, meaning and column of a possible signal."""
 
 
 class _Recognition(Look):
-    """Finds signals and times in a table that was looked at."""
+    """Finds signals and times in the analysed table."""
 
     def __init__(self, raw: RawTable, form: Columns, is_part: bool = False) -> None:
         super().__init__(raw, form)
@@ -81,7 +83,7 @@ class _Recognition(Look):
         said = vars(form).items()
         self.given = {value for one, value in said if one.endswith("_column") and value}
 
-    # Times.
+    # Times
 
     def _time_places(self) -> list[tuple[int, ...]]:
         if self.form.time_column:
@@ -106,12 +108,12 @@ class _Recognition(Look):
         return []
 
     def _written(self) -> list[SeenColumn]:
-        """Return the columns of what may be times in a form that is not known."""
+        """Return the columns that may be times in an unknown format."""
         texts = [one for one in self.of_kind("text") if not self._repeats(one.place)]
         return [one for one in texts if re.search(r"\d\D+\d", one.filled[0])]
 
     def _repeats(self, place: int) -> bool:
-        """Return whether times come more often than the signals of a long form explain."""
+        """Return whether times repeat more often than the signals of a long table explain."""
         cells = self.columns[place].filled
         texts = (len({*column.filled}) for column in self.of_kind("text"))
         return len(cells) > 1 and max(Counter(cells).values()) > max(texts, default=1)
@@ -121,7 +123,7 @@ class _Recognition(Look):
         return found or [one for one in self.of_kind("number", "") if self._clock(one)]
 
     def _are_pairs(self, times: Sequence[SeenColumn]) -> bool:
-        """Return whether each time has its own value beside it."""
+        """Return whether each column of times is next to its own column of values."""
         return all(self.columns[one.place + 1 : one.place + 2] for one in times) and all(
             later.place - earlier.place > 1 for earlier, later in pairwise(times)
         )
@@ -186,7 +188,7 @@ class _Recognition(Look):
         return TimeForm(forms.day_first or forms.month_first, zone, has_zone=forms.has_zone)
 
     def _stated_zone(self) -> str:
-        """Return the zone that stands above the values, as Europe/Berlin."""
+        """Return the time zone named above the values, such as Europe/Berlin, or ''."""
         above = " ".join(cell for _, row in self.rows[: self.start] for cell in row)
         found = re.findall(r"\b[A-Z][A-Za-z]+/[A-Z][A-Za-z_]+\b", above)
         known = [one for one in dict.fromkeys(found) if one in zoneinfo.available_timezones()]
@@ -195,10 +197,10 @@ class _Recognition(Look):
         known += [f"Etc/GMT{-int(one.replace('−', '-')):+d}" for one in dict.fromkeys(offsets)]
         return known[0] if len(known) == 1 else ""
 
-    # Signals.
+    # Signals
 
     def _candidates(self, times: set[int]) -> list[_Candidate]:
-        """Return the names that may be signals, with what they say and their columns."""
+        """Return all possible signals: names, meanings and columns."""
         if self.tag_place is not None:
             value = self._value_column(times)
             return [(tag, said, value) for tag, said in self.tags.items()] if value >= 0 else []
@@ -209,7 +211,7 @@ class _Recognition(Look):
         ]
 
     def _may_be_signal(self, column: SeenColumn) -> bool:
-        """Return whether a column holds numbers, or is called as a signal is."""
+        """Return whether a column contains numbers or has the name of a signal."""
         if column.kind == "number" or column.name in self.given:
             return True
         return column.kind != "" and column.said.quantity in ("position", "pressure", "force")
@@ -227,7 +229,7 @@ class _Recognition(Look):
         return -1
 
     def _find_tags(self, times: set[int]) -> None:
-        """Find out whether each row is one value, and its tags."""
+        """Find the tags if each row has one value."""
         texts = [one for one in self.of_kind("text", "tag") if one.place not in times]
         if self.form.tag_column:
             column = self.by_name(self.form.tag_column, "--tag-column")
@@ -245,7 +247,7 @@ class _Recognition(Look):
             self.tags.setdefault(tag, named([tag], of_unit[0] if unit else ""))
 
     def _different(self, places: Sequence[int]) -> list[tuple[str, ...]]:
-        """Return the different rows of some columns of the whole table: its tags."""
+        """Return the distinct rows of some columns in the whole table, such as its tags."""
         found: dict[tuple[str, ...], None] = {}
         for _, block in self.raw.blocks(places, self.delimiter, self.start + 1, self.above):
             parts = block[list(places)].astype(str).drop_duplicates()
@@ -314,7 +316,7 @@ class _Recognition(Look):
         return mode(units) if units else ""
 
     def _quality(self, place: int, said: Named, time: tuple[int, ...]) -> int | None:
-        """Return the column of the qualities of a signal: that with its name, or the next one."""
+        """Return the quality column of a signal, by position or by name, or None."""
         found = [one for one in self.columns if one.said.quantity == "quality" and one.filled]
         found = [one for one in found if one.place not in time]
         alike = [c for c in found if said.label and c.said.label == said.label]
@@ -348,7 +350,7 @@ class _Recognition(Look):
         return lambda _: True
 
     def signals(self) -> dict[str, tuple[TableSignal, ...]]:
-        """Return the signals of each valve; what is open is asked for."""
+        """Return the signals of each valve; open points become questions."""
         if self.start == len(self.rows):
             where = "under the header" if len(self.columns) > 1 else f"in {len(self.rows)} rows"
             if len(sheets := self.raw.sheets) > 1:
@@ -384,7 +386,7 @@ class _Recognition(Look):
         }
 
     def _of_part(self, candidates: Sequence[_Candidate]) -> Iterator[TableSignal]:
-        """Yield what a file holds of a valve; its name speaks for a column that says nothing."""
+        """Yield the signals in a partial file; its name stands in for an uninformative header."""
         own = table_stem(self.raw.path)
         of_name = named([own])
         own = next((one for one in self.given if plain_name(one) in plain_name(own)), own)
@@ -426,7 +428,7 @@ class _Recognition(Look):
     def _pairs(
         self, drives: Sequence[_Candidate], positions: Sequence[_Candidate]
     ) -> dict[str, tuple[_Candidate, _Candidate]]:
-        """Return drive and position of each valve, by its label."""
+        """Return drive and position of each valve by label."""
         if len(drives) == 1 and len(positions) == 1:
             return {"": (drives[0], positions[0])}
         pairs = {}
@@ -460,7 +462,7 @@ class _Recognition(Look):
 
 
 def _may_be_si(quantity: str, numbers: Sequence[float]) -> bool:
-    """Return whether numbers without a unit may be metres of a stem, or pascals of an actuator."""
+    """Return whether numbers without a unit may be stem travel in m or actuator pressure in Pa."""
     largest = max(map(abs, numbers), default=0.0)
     if quantity == "position":
         return largest < _LONGEST_TRAVEL
@@ -468,21 +470,21 @@ def _may_be_si(quantity: str, numbers: Sequence[float]) -> bool:
 
 
 def _as_written(label: str, name: str) -> str:
-    """Return the words of a label as they stand in a name, as FV-101."""
+    """Return a label as it is spelt in a name, such as FV-101."""
     pattern = r"[\W_]*".join(map(re.escape, label.split()))
     found = re.search(pattern, name, re.IGNORECASE)
     return found[0] if found else label
 
 
 def _clearest(candidates: Sequence[_Candidate]) -> Sequence[_Candidate]:
-    """Return an only candidate; of several, those that speak of actuator or stem themselves."""
+    """Return a single candidate; of several, those that refer directly to actuator or stem."""
     return candidates if len(candidates) == 1 else [one for one in candidates if one[1].is_strong]
 
 
 def recognized(raw: RawTable, form: Columns, is_part: bool = False) -> Layout:
-    """Find out how a table is to be read, by what is said of it, and what it leaves open.
+    """Recognize the layout of a table and its open questions, given its known format.
 
-    Of a part of a valve's signals, which other files complete, whatever is there is taken.
+    If the file has only a part of the signals of a valve (`is_part`), all signals in it are taken.
     """
     look = _Recognition(raw, form, is_part)
     valves = look.signals()

@@ -20,18 +20,18 @@ from valve_friction_ros.streams.samples import nanoseconds
 
 @dataclass(frozen=True, eq=False)
 class RecordedValve:
-    """The recording of one valve, or the reason that it has none.
+    """The recording of one valve, or the reason why there is none.
 
     Attributes
     ----------
     path : Path
-        The file or folder that it was read from.
+        The file or folder of the recording.
     name : str
         Namespace of the valve in a bag; empty for a file that does not name its valve.
     outcome : Recording or RefusalError
         The recording, or its refusal.
     notes : tuple of str
-        Limitations of the recording: what was left out, and why.
+        Limitations of the recording: omitted samples, and the reason.
     """
 
     path: Path
@@ -41,20 +41,20 @@ class RecordedValve:
 
     @property
     def label(self) -> str:
-        """Name in a message."""
+        """Name of the recording in messages."""
         return f"{self.path}, {self.name}" if self.name else f"{self.path}"
 
     def recording(self) -> Recording:
         """Return the recording.
 
-        Raises RefusalError if the valve has no recording: file, valve, cause and notes.
+        Raises RefusalError, with file, valve, cause and notes, if the valve has no recording.
         """
         if isinstance(self.outcome, RefusalError):
             raise self.refused(self.outcome)
         return self.outcome
 
     def refused(self, cause: RefusalError) -> RefusalError:
-        """Return a refusal with file, valve and notes; the notes may hold its reason."""
+        """Return a refusal with file, valve and notes, which may contain the reason."""
         return RefusalError("; ".join((f"{self.label}: {cause}", *self.notes)))
 
 
@@ -67,8 +67,8 @@ class Stretch:
     begin, end : float
         Times since the first sample of the file, s; both belong to the stretch.
     last : float
-        Length of its end, s. A recording that ends when a node identified, read with the
-        node's `window`, equals the node's buffer.
+        Length of the final part to read, s. A recording that ends at an identification of a node,
+        read with the `window` of this node, equals its buffer.
 
     Raises
     ------
@@ -88,7 +88,7 @@ class Stretch:
             raise ValueError(f"the last seconds must be above zero, got {self.last:g}")
 
     def contains(self, since_first: int) -> bool:
-        """Return whether a time after the first sample, ns, lies between begin and end."""
+        """Return whether a time since the first sample, ns, lies between begin and end."""
         begin, end = (
             nanoseconds(one) if math.isfinite(one) else one for one in (self.begin, self.end)
         )

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Recorded files of any kind, read by one function."""
+"""Reading of recordings from tables and bags."""
 
 import math
 from collections.abc import Sequence
@@ -43,7 +43,7 @@ def _share(read: ReadSignal) -> NDArray[np.float64]:
 
 
 def _position(read: ReadSignal, form: Columns, valve: Valve) -> NDArray[np.float64]:
-    """Return the position in m, rising the way in which the pressure pushes the stem."""
+    """Return the position in m, positive in the direction in which the pressure pushes the stem."""
     is_share = read.signal.unit in SHARES
     if (is_share or form.inverted_position) and not math.isfinite(valve.travel):
         needs = f"a position in {read.signal.unit}" if is_share else "an inverted position"
@@ -61,7 +61,7 @@ def _position(read: ReadSignal, form: Columns, valve: Valve) -> NDArray[np.float
 
 
 def _pressure(read: ReadSignal, valve: Valve, form: Columns) -> NDArray[np.float64]:
-    """Return a pressure in Pa; refuse one outside the sensor's range."""
+    """Return a pressure in Pa; refuse values outside the range of the sensor."""
     unit = read.signal.unit
     if unit in SHARES:
         low, high = (
@@ -98,8 +98,8 @@ def _drive(
 ) -> tuple[NDArray[np.float64], Drive]:
     """Return the drive in its SI unit.
 
-    A force on the diaphragm of a valve becomes the pressure that exerts it. Of a double-acting
-    actuator it is the pressure that alone would exert the force of both.
+    A force on the diaphragm of a valve is converted to the pressure that exerts it. For a
+    double-acting actuator the drive is the single pressure that would exert the net force.
     """
     read, *others = reads
     if read.signal.quantity == "force":
@@ -116,9 +116,9 @@ def _drive(
 
 
 def holds_a_force(path: Path, form: Columns, beside: Sequence[Path] = ()) -> bool:
-    """Return whether a force, and no pressure, drives the stem in a table or several of a valve.
+    """Return whether the drive in the table or tables of a valve is a force, not a pressure.
 
-    Raises ValueError if the file cannot be read, or leaves something open.
+    Raises ValueError if a file cannot be read or leaves a question open.
     """
     table = OpenTables((path, *beside), form)
     table.require_settled()
@@ -134,38 +134,38 @@ def read_table(
     name: str | None = None,
     beside: Sequence[Path] = (),
 ) -> tuple[RecordedValve, ...]:
-    """Read the recordings of pressure, or force, and stem position of all valves of a table.
+    """Read the recordings of pressure, or force, and stem position of all valves in a table.
 
-    Its samples pass through the same resampling as the samples of topics, with stamps in whole
-    nanoseconds, so that a recording gives the same numbers from a file and from topics.
+    The samples are resampled like those of topics, with stamps in whole nanoseconds, so that a
+    recording gives the same numbers from a file and from topics.
 
     Parameters
     ----------
     path : Path
-        The file; its first bytes decide what it is.
+        The file; its first bytes determine its format.
     valve : Valve
-        With a diaphragm it converts a force in the file into a pressure; it gives the sensor's
-        range, and the travel for positions in percent.
+        Gives the range of the sensor, and the travel for positions in percent. A diaphragm converts
+        a force in the file to a pressure.
     form : Columns, optional
-        What the file does not say itself. Pressure is read from a file with both pressure and
-        force.
+        Format that the file does not state itself. If a file has both pressure and force, the
+        pressure is read.
     stretch : Stretch, optional
         The part to read; errors outside it do not matter.
     name : str, optional
-        Only this valve of several.
+        Read only this valve.
     beside : sequence of Path
-        Further files with signals of the same valve, where each signal has its own.
+        Further files of the same valve, if each signal has its own file.
 
     Returns
     -------
     tuple of RecordedValve
-        The recordings on a uniform grid; the first of their notes says how the table was read.
+        The recordings on a uniform grid; their first note describes how the table was read.
 
     Raises
     ------
     ValueError
-        If the file cannot be read, leaves something open, holds an impossible value, or more bad
-        values than `form` allows: file, row, cause and remedy.
+        If the file cannot be read, leaves a question open, or contains an impossible value or more
+        bad values than `form` allows. The message gives file, row, cause and remedy.
     RefusalError
         If there is only one sample, or gaps take more than half of the time.
     """
@@ -197,7 +197,7 @@ def read_table(
 def _recorded(
     table: OpenTables, label: str, reads: Sequence[ReadSignal], valve: Valve, form: Columns
 ) -> RecordedValve:
-    """Make the recording of one valve: what drives it, its position, what opposes it."""
+    """Build the recording of one valve from its drive, position and opposing pressure."""
     path = table.path
     for each in reads:
         require_good(each, form)
@@ -228,7 +228,7 @@ def _recorded(
 
 @dataclass(frozen=True)
 class ReadingOptions:
-    """Options for what a file does not state itself.
+    """Options for properties that a file does not state itself.
 
     Attributes
     ----------
@@ -237,9 +237,9 @@ class ReadingOptions:
     topics : TopicChoice
         The topics to read from a bag.
     stretch : Stretch
-        The part of the time to read.
+        The part to read.
     beside : tuple of Path
-        Further tables with signals of the same valve, where each signal has its own file.
+        Further tables of the same valve, if each signal has its own file.
     """
 
     columns: Columns = field(default_factory=Columns)
@@ -249,12 +249,12 @@ class ReadingOptions:
 
 
 def holds_force(path: Path, options: ReadingOptions) -> bool:
-    """Return whether a file holds the force of a machine without a diaphragm, and no pressure.
+    """Return whether a file has the force of a machine without a diaphragm, and no pressure.
 
     Raises
     ------
     ValueError
-        If it is a table that cannot be read, or has neither pressure nor force.
+        If a table cannot be read or has neither pressure nor force.
     """
     is_table = not _is_bag(path, options)
     return is_table and holds_a_force(path, options.columns, options.beside)
@@ -279,7 +279,7 @@ def _is_bag(path: Path, options: ReadingOptions) -> bool:
 def read_recordings(
     path: Path, valve: Valve, options: ReadingOptions | None = None
 ) -> tuple[RecordedValve, ...]:
-    """Read the recordings of all valves in a table or a bag; its content decides which it is.
+    """Read the recordings of all valves in a table or a bag, recognized by content.
 
     Parameters
     ----------
@@ -287,21 +287,20 @@ def read_recordings(
         CSV file, gzipped or not, ``-`` for standard input, Excel or Parquet; or bag: folder or
         file, MCAP or SQLite3, compressed or not.
     valve : Valve
-        Range of the sensor, travel, and diaphragm; for all valves of a bag.
+        Range of the sensor, travel and diaphragm, for all valves of a bag.
     options : ReadingOptions, optional
         Format, topics and stretch.
 
     Returns
     -------
     tuple of RecordedValve
-        One from a table; from a bag one for each valve, with a refusal where its signals are
-        bad.
+        One recording per valve. In a bag, a valve with bad signals has a refusal instead.
 
     Raises
     ------
     ValueError, RefusalError
-        If nothing can be read: one line with cause and remedy. So also for a bag without the
-        libraries that bags need.
+        If nothing can be read, or the libraries for bags are missing. The message is one line with
+        cause and remedy.
     """
     options = options or ReadingOptions()
     if _is_bag(path, options):

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""A table that is read: the samples of each signal, what was left out of them, and why."""
+"""Reading of a table: the samples of each signal, and omitted values with the reason."""
 
 import csv
 import itertools
@@ -36,27 +36,28 @@ if TYPE_CHECKING:
     import pandas as pd
 
 _MOST_WORDS = 4
-"""Kinds of bad entries that a message names. Chosen: it stays on one line."""
+"""Most kinds of bad entries that a message names. Chosen: the message stays on one line."""
 _MOST_TAGS = 10_000
 _MOST_NAMES = 6
 _MOST_SPANS = 3.0
-"""Spans of a share, as -100 to 200 %, beyond which a number stands for none, as -9999. Chosen."""
+"""Accepted range of a share, over its span, as -100 to 200 %; a number beyond it, such as -9999,
+means no value. Chosen."""
 _MOST_REPEATED = 0.5
-"""Share of rows that may repeat the row above, to the last value. Chosen."""
+"""Largest share of rows that may repeat the previous row exactly. Chosen."""
 
 
 @dataclass(eq=False)
 class ReadSignal:
-    """The samples of a signal as they were read, in the unit of the table.
+    """The samples of a signal as read, in the unit of the table.
 
     Attributes
     ----------
     signal : TableSignal
-        Where it is in the table.
+        Location of the signal in the table.
     stamps, values, rows : ndarray, shape (n,)
-        Times, ns, values, and rows as a spreadsheet counts.
+        Times, ns, values, and rows numbered as in a spreadsheet.
     bad : Counter of str
-        What was left out, and how often.
+        Number of omitted entries by kind.
     example : tuple of int, str and str
         Row, column and text of the first bad value.
     """
@@ -69,7 +70,7 @@ class ReadSignal:
     example: tuple[int, str, str] = (0, "", "")
 
     def where(self, kept: NDArray[np.bool_] | slice) -> "ReadSignal":
-        """Return some of the samples."""
+        """Return the selected samples."""
         return replace(
             self, stamps=self.stamps[kept], values=self.values[kept], rows=self.rows[kept]
         )
@@ -81,7 +82,7 @@ class ReadSignal:
 
 @dataclass(eq=False)
 class _Parts:
-    """The blocks of a signal while it is read."""
+    """The blocks of a signal during reading."""
 
     signal: TableSignal
     blocks: list[ReadSignal] = field(default_factory=list)
@@ -96,7 +97,7 @@ class _Parts:
             del self.blocks[0]
 
     def joined(self, last: float) -> ReadSignal:
-        """Return all samples; the blocks are given up, so that memory holds a signal once."""
+        """Return all samples and release the blocks, so that a signal is in memory only once."""
         blocks, self.blocks = self.blocks, []
         stamps = np.concatenate([np.empty(0, np.int64), *(one.stamps for one in blocks)])
         values = np.concatenate([np.empty(0), *(one.values for one in blocks)])
@@ -108,14 +109,14 @@ class _Parts:
 
 
 class OpenTable:
-    """A table whose layout is known; `require_settled` asks for what is not.
+    """A table with a recognized layout; `require_settled` raises its open questions.
 
     Attributes
     ----------
     path : Path
         The file.
     layout : Layout
-        How it is read.
+        Layout of the table.
     """
 
     def __init__(self, path: Path, form: Columns | None = None, is_part: bool = False) -> None:
@@ -124,7 +125,7 @@ class OpenTable:
         self.layout: Layout = recognized(raw, form or Columns(), is_part)
 
     def require_settled(self) -> None:
-        """Raise ValueError if the table leaves something open: all of it, in one line."""
+        """Raise ValueError, with all open questions in one line, if the table leaves any."""
         layout = self.layout
         if not layout.questions:
             return
@@ -141,15 +142,15 @@ class OpenTable:
         signals: Sequence[TableSignal],
         stretch: Stretch | None = None,
     ) -> list[ReadSignal]:
-        """Read signals within a stretch, and keep no more of the table than that.
+        """Read signals within a stretch; only these samples are kept in memory.
 
         Raises
         ------
         ValueError
-            If the table cannot be read to its end, holds more rows than are to be read, or times
-            that go back: the row, and what to do.
+            If the table cannot be read to its end, has too many rows, or has times that go back.
+            The message gives row and remedy.
         RefusalError
-            If the stretch holds no rows.
+            If the stretch contains no rows.
         """
         stretch = stretch or Stretch()
         parts = [_Parts(signal) for signal in signals]
@@ -258,7 +259,7 @@ class OpenTable:
     def _there(
         self, block: "pd.DataFrame", cells: "pd.Series[Any]", signal: TableSignal
     ) -> NDArray[np.bool_]:
-        """Return which rows hold a value of a signal; an empty entry is none."""
+        """Return which rows have a value of a signal; an empty entry is not a value."""
         if cells.dtype.kind in "fiu":
             there = cells.notna().to_numpy()
         else:
@@ -293,7 +294,7 @@ class OpenTable:
         if not newest or not math.isfinite(stretch.last):
             return
         first = next(one.stamps for part in parts for one in part.blocks if one.stamps.size)
-        if first[0] > first[-1]:  # the newest row comes first
+        if first[0] > first[-1]:  # newest row first
             return
         for part in parts:
             part.forget_before(min(newest) - (stretch.last + 1) * 1e9)
@@ -307,11 +308,11 @@ class OpenTable:
             )
 
     def _in_order(self, read: ReadSignal) -> ReadSignal:
-        """Return the samples in the order of time; refuse times that go back."""
+        """Return the samples in order of time; refuse times that go back."""
         if read.stamps.size < 2:
             return read
         steps = np.diff(read.stamps)
-        if (steps <= 0).all() and (steps < 0).any():  # the newest first, as some programs list
+        if (steps <= 0).all() and (steps < 0).any():  # newest first, as in some programs
             read = read.where(slice(None, None, -1))
             steps = np.diff(read.stamps)
         same = (steps == 0) & (np.diff(read.values) == 0)
@@ -340,14 +341,14 @@ class OpenTable:
 
 
 class OpenTables:
-    """The table of a recording, or several of which each holds some signals of one valve.
+    """The table of a recording, or several tables with the signals of one valve.
 
     Attributes
     ----------
     path : Path
         The first file.
     layout : Layout
-        How they are read; the signals are those of all.
+        Common layout with the signals of all tables.
     """
 
     def __init__(self, paths: Sequence[Path], form: Columns | None = None) -> None:
@@ -359,11 +360,11 @@ class OpenTables:
 
     @property
     def name(self) -> str:
-        """All files, for a message."""
+        """All files, for messages."""
         return ", ".join(map(str, self._tables))
 
     def require_settled(self) -> None:
-        """Raise ValueError if the files leave something open: all of it, in one line."""
+        """Raise ValueError, with all open questions in one line, if the files leave any."""
         if len(self._tables) == 1:
             self._tables[self.path].require_settled()
         elif self.layout.questions:
@@ -376,7 +377,7 @@ class OpenTables:
     def read(
         self, signals: Sequence[TableSignal], stretch: Stretch | None = None
     ) -> list[ReadSignal]:
-        """Read signals, as `OpenTable.read` does; begin and end are those of each file."""
+        """Read signals as `OpenTable.read` does; the stretch applies to each file separately."""
         found: dict[TableSignal, ReadSignal] = {}
         for path, table in self._tables.items():
             if own := [signal for signal in signals if signal.path == path]:
@@ -385,7 +386,7 @@ class OpenTables:
 
 
 def _joined(layouts: Sequence[Layout]) -> Layout:
-    """Put the files of one valve together; ask which holds what, where they do not say it."""
+    """Combine the files of one valve; ask which signal each contains if this is unclear."""
     first, *beside = layouts
     forms = [vars(each.form) for each in layouts]
     form = replace(first.form, **{name: one for each in forms for name, one in each.items() if one})
@@ -428,7 +429,7 @@ def _joined(layouts: Sequence[Layout]) -> Layout:
 
 
 def _zones_apart(layouts: Sequence[Layout], names: Sequence[str]) -> Iterator[str]:
-    """Ask for the zone of the files without one, if others have theirs."""
+    """Ask for the time zone of files without one if other files have one."""
     dated = [
         (name, form)
         for name, each in zip(names, layouts, strict=True)
@@ -455,7 +456,7 @@ def _first(stamps: Any) -> int | None:
 
 
 def left_out(read: ReadSignal) -> str:
-    """Return in words what was left out of a signal; nothing for a whole one."""
+    """Describe the omitted entries of a signal; empty if there are none."""
     if not read.bad:
         return ""
     named = [
@@ -471,7 +472,7 @@ def left_out(read: ReadSignal) -> str:
 
 
 def require_good(read: ReadSignal, form: Columns) -> None:
-    """Refuse a signal with more bad values than are to be left out."""
+    """Refuse a signal with more bad values than permitted."""
     count = read.bad.total() - read.bad["repeated row"]
     whole = count + read.values.size
     if count <= form.maximum_bad_share * whole:
@@ -489,8 +490,8 @@ def require_good(read: ReadSignal, form: Columns) -> None:
 def read_columns(path: Path, names: Sequence[str]) -> dict[str, NDArray[np.float64]]:
     """Read named columns of finite numbers from a CSV file of this package, shape (n,) each.
 
-    Needs no library. Raises ValueError, in one line, if the file cannot be read or holds anything
-    else.
+    This needs no library. Raises ValueError, in one line, if the file cannot be read or contains
+    anything else.
     """
     try:
         with path.open(encoding="utf-8-sig", newline="") as stream:

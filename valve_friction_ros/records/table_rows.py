@@ -9,7 +9,7 @@
 
 """The cells of a table: CSV, gzipped or not, or from a pipe; Excel; Parquet; MATLAB.
 
-pandas splits text; it is imported when a table is read.
+pandas parses text; it is imported when a table is read.
 """
 
 import atexit
@@ -50,7 +50,7 @@ _COPIED = 1 << 20
 
 @functools.cache
 def _copy(path: Path, most: float) -> Path:
-    """Copy a pipe to a file that goes with the process."""
+    """Copy a pipe to a file that is removed with the process."""
     folder = tempfile.mkdtemp(prefix="valve_friction_")
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     target = Path(folder, "pipe")
@@ -69,31 +69,31 @@ def _copy(path: Path, most: float) -> Path:
 
 
 def readable(path: Path, most: float) -> Path:
-    """Return a file with the content of `path`, standard input and pipes among them.
+    """Return a file with the content of `path`, which may be standard input or a pipe.
 
-    The copy of a pipe holds at most `most` MB; ValueError where that is not enough.
+    Raises ValueError if a pipe holds more than `most` MB.
     """
     try:
         is_pipe = path == STANDARD_INPUT or stat.S_ISFIFO(path.stat().st_mode)
         return _copy(path, most) if is_pipe else path
     except OSError:
-        return path  # whoever opens it says why that fails
+        return path  # opening it later reports the cause
 
 
 _LONGEST_LINE = 1 << 20
-"""Most bytes of a line. Chosen: far beyond any table, and little memory."""
+"""Longest line, bytes. Chosen: far beyond any table, but little memory."""
 
 _PIECE = 1 << 16
-"""Bytes that are read at a time."""
+"""Bytes read at a time."""
 
 BLOCK = 1 << 16
-"""Rows that are converted at a time. Chosen: some megabytes of text."""
+"""Rows converted at a time. Chosen: some megabytes of text."""
 
 PROGRESS: ContextVar[Callable[[float], None] | None] = ContextVar("progress", default=None)
-"""Is told the share of a text that was read, block by block."""
+"""Callback that receives the share of a text read so far, block by block."""
 
 LOOKED_AT = 300
-"""Rows that are looked at before a table is read. Chosen: more than any preamble of an export."""
+"""Rows analysed before a table is read. Chosen: more than any preamble of an export."""
 
 _MARKS = (
     (codecs.BOM_UTF8, "utf-8-sig"),
@@ -103,11 +103,11 @@ _MARKS = (
     (codecs.BOM_UTF16_BE, "utf-16"),
 )
 _FALLBACK = "cp1252"
-"""Encoding of bytes that are not UTF-8: what Windows writes in Western Europe and America."""
+"""Encoding of bytes that are not UTF-8, as used by Windows in Western Europe and America."""
 
 
 class _Bounded(io.RawIOBase):
-    """The bytes of a file, unpacked where it is gzipped; refuses too many, and endless lines."""
+    """The bytes of a file, unpacked if gzipped; refuses too large files and endless lines."""
 
     def __init__(self, path: Path, most: float) -> None:
         self._most = most
@@ -122,7 +122,7 @@ class _Bounded(io.RawIOBase):
             self._stream = cast(IO[bytes], gzip.GzipFile(fileobj=self._file))
 
     def readable(self) -> bool:
-        """Return True, as io asks."""
+        """Return True, as io requires."""
         return True
 
     def close(self) -> None:
@@ -133,11 +133,11 @@ class _Bounded(io.RawIOBase):
 
     @property
     def share(self) -> float:
-        """Share of the file that was read."""
+        """Share of the file read so far."""
         return self._file.tell() / self._size
 
     def readinto(self, room: Any, /) -> int:
-        """Read the next bytes."""
+        """Read the next bytes into `room`."""
         piece = self._stream.read(len(memoryview(room)))
         self._left -= len(piece)
         if self._left < 0:
@@ -154,7 +154,7 @@ class _Bounded(io.RawIOBase):
         return len(piece)
 
     def _require_quotes(self, piece: bytes) -> None:
-        """Refuse a quote without its end, behind which all else would be one cell."""
+        """Refuse an unclosed quote, after which everything would be one cell."""
         is_open = self._quoted > 0
         if count := piece.count(b'"'):
             is_open ^= bool(count % 2)
@@ -166,11 +166,11 @@ class _Bounded(io.RawIOBase):
 
 
 def encoding_of(start: bytes) -> str:
-    """Return the encoding of a text, by its mark or its first bytes."""
+    """Return the encoding of a text, from its byte order mark or its first bytes."""
     for mark, encoding in _MARKS:
         if start.startswith(mark):
             return encoding
-    if len(start) > 1 and 0 in start[:2]:  # UTF-16 without its mark: every other byte is zero
+    if len(start) > 1 and 0 in start[:2]:  # UTF-16 without a mark: every other byte is zero
         return "utf-16-be" if start[0] == 0 else "utf-16-le"
     try:
         codecs.getincrementaldecoder("utf-8")().decode(start)
@@ -180,23 +180,23 @@ def encoding_of(start: bytes) -> str:
 
 
 Cells = tuple[NDArray[np.int64], "pd.DataFrame"]
-"""Row numbers, as a spreadsheet counts, and their cells: text, or the types of a typed file."""
+"""Row numbers as in a spreadsheet, and their cells: text, or the types of a typed file."""
 
 
 @dataclass(frozen=True, eq=False)
 class RawTable:
-    """The cells of a file, before anything is known of them.
+    """The cells of a file before recognition.
 
     Attributes
     ----------
     path : Path
-        The file, as messages name it.
+        The file, as named in messages.
     head : tuple of str
-        The first lines of a text; empty for a file of cells.
+        First lines of a text; empty for a file of cells.
     cells : sequence of sequences of str
-        The first rows of a file of cells.
+        First rows of a file of cells.
     encoding : str
-        Of a text.
+        Encoding of a text.
     """
 
     path: Path
@@ -208,19 +208,19 @@ class RawTable:
 
     @property
     def is_text(self) -> bool:
-        """True for a text, whose marks are to be found."""
+        """Whether the file is text, with delimiters to recognize."""
         return not self.cells
 
     @property
     def sheets(self) -> list[str]:
-        """The sheets of a workbook, if none was chosen."""
+        """The sheets of a workbook if none was chosen, else empty."""
         if self.form.sheet or self.is_text or _start(self.place) != _ZIP:
             return []
         with self.place.open("rb") as stream:
             return list(_library("openpyxl").load_workbook(stream, read_only=True).sheetnames)
 
     def rows(self, delimiter: str) -> list[tuple[int, list[str]]]:
-        """Return the first rows, split by `delimiter`; with each the number of lines up to it."""
+        """Return the first rows split by `delimiter`, each with the number of lines up to it."""
         if not self.is_text:
             return list(enumerate(map(list, self.cells), start=1))
         if delimiter == " ":
@@ -237,11 +237,10 @@ class RawTable:
     def blocks(
         self, places: Sequence[int], delimiter: str, first: int, above: int
     ) -> Iterator[Cells]:
-        """Yield columns from row `first` on, as a spreadsheet counts, block by block.
+        """Yield columns from row `first` on, numbered as in a spreadsheet, block by block.
 
-        `above` is the number of lines above that row. The columns of a block are called by their
-        places. Raises ValueError, with the file and the
-        cause, if it cannot be read to its end.
+        `above` is the number of lines above that row. The columns of a block are labelled by their
+        places. Raises ValueError, with file and cause, if the file cannot be read to its end.
         """
         with _explained(self.path, self.is_text):
             if self.is_text:
@@ -308,7 +307,7 @@ def _explained(path: Path, is_text: bool) -> Iterator[None]:
         if is_text and not isinstance(error, _OF_TEXT):
             raise
         cause = " ".join(cause_of(error).split())[:200] or type(error).__name__
-        if cause.endswith("and found 0"):  # pandas' words for a block of blank lines
+        if cause.endswith("and found 0"):  # message of pandas for a block of blank lines
             cause = f"{BLOCK} blank rows in succession: remove them"
         if isinstance(error, UnicodeError):
             cause = f"{error}: name its encoding (--encoding)"
@@ -325,15 +324,15 @@ _ZIP = b"PK\x03\x04"
 
 
 def _start(path: Path) -> bytes:
-    """Return the first bytes of a file, which tell what reads it."""
+    """Return the first bytes of a file, which determine its reader."""
     with path.open("rb") as stream:
         return stream.read(4)
 
 
 def open_raw(path: Path, form: Columns) -> RawTable:
-    """Open a file, and read its first rows.
+    """Open a file and read its first rows.
 
-    Raises ValueError, with the file and the cause, if it cannot be read, or is empty.
+    Raises ValueError, with file and cause, if it cannot be read or is empty.
     """
     place = readable(path, form.maximum_megabytes)
     try:
@@ -375,8 +374,8 @@ def _library(name: str) -> Any:
 
 
 def _shown(cell: object) -> str:
-    """Return a cell as a CSV file would hold it."""
-    if isinstance(cell, datetime):  # pandas' time stamps too, to the nanosecond; NaT is none
+    """Return a cell as text, as in a CSV file."""
+    if isinstance(cell, datetime):  # includes pandas' time stamps, to the nanosecond; NaT is empty
         return cell.isoformat(sep=" ") if cell == cell else ""  # noqa: PLR0124
     if cell is None or (isinstance(cell, float) and math.isnan(cell)):
         return ""
@@ -384,7 +383,7 @@ def _shown(cell: object) -> str:
 
 
 def _frames(path: Path, form: Columns, places: Sequence[int] | None) -> Iterator["pd.DataFrame"]:
-    """Yield the columns of a file of cells, all without `places`, called by their places."""
+    """Yield the columns at `places` of a file of cells, labelled by place; by default all."""
     for frame in _READERS[_start(path)](path, form, places):
         yield frame if places is None else frame.set_axis(list(places), axis="columns")
 
@@ -399,7 +398,7 @@ def _excel(path: Path, form: Columns, places: Sequence[int] | None) -> Iterator[
         raise ValueError(
             f"{size:.4g} MB, unpacked: raise maximum_megabytes (--maximum-megabytes), or cut it"
         )
-    with path.open("rb") as stream:  # a name without .xlsx would be refused
+    with path.open("rb") as stream:  # a path not ending in .xlsx would be refused
         book = openpyxl.load_workbook(stream, read_only=True, data_only=True)
         if form.sheet and form.sheet not in book.sheetnames:
             raise ValueError(f"no sheet {form.sheet!r} among {', '.join(book.sheetnames)}")
@@ -455,4 +454,4 @@ _READERS: Mapping[bytes, Callable[..., Iterator["pd.DataFrame"]]] = {
     b"MATL": _matlab,
     b"\xd0\xcf\x11\xe0": _old_excel,
 }
-"""What reads a file of cells, by its first bytes."""
+"""Readers of files of cells, by their first bytes."""

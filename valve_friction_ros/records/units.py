@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Units of recorded numbers, and quantities as people write them: a number and its unit."""
+"""Units of recorded numbers, and parsing of quantities such as a number with its unit."""
 
 import re
 from collections.abc import Mapping
@@ -19,27 +19,27 @@ if TYPE_CHECKING:
 
 
 class Unit(NamedTuple):
-    """Size of a unit as a ratio, so that decimals are converted with one rounding only.
+    """Size of a unit as a ratio, so that decimals are converted with only one rounding.
 
-    3.7 mm is 3.7/1000 m to the last bit, which 3.7·0.001 is not.
+    3.7 mm is 3.7/1000 m to the last bit; 3.7·0.001 m is not.
 
     Attributes
     ----------
     multiplier, divisor : float
-        One of this unit is multiplier/divisor of the SI unit.
+        The unit is multiplier/divisor SI units.
     """
 
     multiplier: float
     divisor: float = 1.0
 
     def to_si(self, values: "NDArray[np.float64]") -> "NDArray[np.float64]":
-        """Convert values in this unit."""
+        """Convert values from this unit to the SI unit."""
         return values * self.multiplier / self.divisor
 
 
 _POUND_FORCE = 4.4482216152605
 _KILOGRAM_FORCE = 9.80665
-"""N: exact by definition, the pound of 0.45359237 kg and the standard gravity of 9.80665 m/s²."""
+"""Kilogram-force, N. Exact by definition: pound of 0.45359237 kg, standard gravity 9.80665 m/s²."""
 
 PRESSURE_UNITS: Mapping[str, Unit] = {
     "Pa": Unit(1),
@@ -69,7 +69,7 @@ SHARES: Mapping[str, tuple[float, float]] = {
     "fraction": (0.0, 1.0),
     "mA": (4.0, 20.0),
 }
-"""Units of a share: of the travel, or of the range of the pressure sensor; both ends of it."""
+"""Units of a share of the travel or of the range of the pressure sensor, with both ends."""
 
 FORCE_UNITS: Mapping[str, Unit] = {
     "N": Unit(1),
@@ -117,11 +117,11 @@ _OTHER_NAMES = {name: unit for unit, names in _NAMES.items() for name in names.s
 
 _BRACKETS = str.maketrans("[](){}<>", " " * 8)
 _GAUGE_OR_ABSOLUTE = re.compile(r"\s+(?:g|a|abs|gauge|absolute|ü)$", re.IGNORECASE)
-"""What follows a unit of pressure; the `pressure_reference` of the valve says the same."""
+"""Suffixes of a unit of pressure; `pressure_reference` of the valve has the same meaning."""
 
 
 def unit_named(name: str) -> str:
-    """Return the name that this module has for a unit, whatever its case; else it as it is."""
+    """Return the name of a unit in this module, in any case; an unknown name is unchanged."""
     plain = _GAUGE_OR_ABSOLUTE.sub("", name.translate(_BRACKETS).strip())
     return _OTHER_NAMES.get(plain) or _BY_CASE.get(plain.casefold(), name)
 
@@ -161,7 +161,7 @@ def _si(number: str, unit: Unit) -> float:
 
 
 def quantity(text: str, units: Mapping[str, Unit]) -> float:
-    """Read a number with its unit, as ``690 cm2``, in its SI unit; raises ValueError."""
+    """Convert a number with a unit, such as ``690 cm2``, to its SI unit; raises ValueError."""
     found = _SINGLE.fullmatch(text) if len(text) < 100 else None
     if found is None:
         example = next(each for known, each in _EXAMPLES if known is units)
@@ -171,7 +171,7 @@ def quantity(text: str, units: Mapping[str, Unit]) -> float:
 
 
 def span(text: str, units: Mapping[str, Unit]) -> tuple[float, float]:
-    """Read a range with its unit, as ``0.2..1.0 bar``, in its SI unit; raises ValueError."""
+    """Convert a range with a unit, such as ``0.2..1.0 bar``, to its SI unit; raises ValueError."""
     found = _SPAN.fullmatch(text) if len(text) < 100 else None
     if found is None:
         raise ValueError(f"{text[:60]!r} is not a range with a unit, such as 0.2..1.0 bar")

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""What is asked of an actuator, and the valve file that the answers make."""
+"""Questions about an actuator, and the valve file built from the answers."""
 
 import json
 from collections.abc import Callable, Iterator, Mapping
@@ -20,7 +20,7 @@ _ATMOSPHERE = 101_325.0
 
 
 class ActuatorQuestion(NamedTuple):
-    """What is asked, how an answer is read, and what stands for none; None: it must be answered."""
+    """Text of a question, parser of the answer and default; None: an answer is required."""
 
     name: str
     words: str
@@ -30,7 +30,7 @@ class ActuatorQuestion(NamedTuple):
 
 
 def _choice(name: str, words: str, *choices: str) -> ActuatorQuestion:
-    """Ask for one of two words, or its beginning; the first is the default."""
+    """Return a question for one of several words or its beginning; the first is the default."""
 
     def chosen(text: str) -> str:
         close = [word for word in choices if text and word.startswith(text.strip().lower())]
@@ -68,7 +68,7 @@ QUESTIONS = (
 )
 
 _Entry = tuple[str, Any, str]
-"""Key, value and comment of a line of the file."""
+"""Key, value and comment of a line in the file."""
 
 
 def _valve(answers: Mapping[str, Any]) -> Iterator[_Entry]:
@@ -98,7 +98,7 @@ def _valve(answers: Mapping[str, Any]) -> Iterator[_Entry]:
 
 
 def _columns(answers: Mapping[str, Any], given: Mapping[str, Any]) -> Iterator[_Entry]:
-    """Yield what is said of the tables, and then what follows of the actuator."""
+    """Yield the given entries on the tables, then those that follow from the actuator."""
     yield from ((name, value, "") for name, value in given.items())
     found: list[_Entry] = []
     if answers["air_to"] == "close" and answers["position"] == "plug":
@@ -119,10 +119,10 @@ def valve_description(answers: Mapping[str, Any], columns: Mapping[str, Any]) ->
     Parameters
     ----------
     answers : mapping of str to object
-        The answers by the names of `QUESTIONS`, in SI units; None stands for none, and only area,
-        travel, and those with a choice need be there.
+        Answers by the names of `QUESTIONS`, in SI units; None means no answer. Only area, travel
+        and questions with a choice are required.
     columns : mapping of str to object
-        How tables of the valve are written, by the names of `Columns`.
+        Format of the tables of the valve, by the names of `Columns`.
     """
     lines = [
         "# A valve for `valve_friction ... --valve`, and for nodes by --params-file; commands",
@@ -143,5 +143,5 @@ def _line(name: str, value: object, comment: str) -> str:
         mantissa, mark, power = shown.partition("e")
         shown = mantissa + (".0" if "." not in mantissa else "") + mark + power
     else:
-        shown = json.dumps(value)  # YAML reads JSON
+        shown = json.dumps(value)  # JSON is valid YAML
     return f"    {name}: {shown}" + (f"  # {comment}" if comment else "")

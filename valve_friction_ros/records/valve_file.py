@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The YAML file that describes a valve: plain, or as a node's parameters."""
+"""The YAML file that describes a valve: plain, or as the parameters of a node."""
 
 import os
 from collections.abc import Iterator, Mapping
@@ -37,11 +37,11 @@ from valve_friction_ros.settings import (
 )
 
 _LARGEST = 1_000_000
-"""Most bytes of a file. Chosen: a valve file has some hundred; PyYAML reads 0.1 MB a second."""
+"""Largest file, bytes. Chosen: a valve file has some hundred; PyYAML reads 0.1 MB per second."""
 
 
 class _StrictLoader(yaml.SafeLoader):
-    """Refuses a repeated key; YAML would silently take the last value."""
+    """Refuses repeated keys; YAML would silently use the last value."""
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
         """Build a mapping; refuse a repeated key."""
@@ -57,7 +57,7 @@ class _StrictLoader(yaml.SafeLoader):
 
 
 def read_yaml(path: Path) -> Any:
-    """Read a YAML file; raises ValueError, with the file and the cause, if that fails."""
+    """Read a YAML file; raises ValueError, with file and cause, if this fails."""
     try:
         with path.open("rb") as stream:
             content = stream.read(_LARGEST + 1)
@@ -78,24 +78,24 @@ _OUR_NODE = "identifier"
 
 @dataclass(frozen=True)
 class ValveFile:
-    """A valve, and what else its file says.
+    """A valve, and the other content of its file.
 
     Attributes
     ----------
     valve : Valve
         Geometry and sensor range.
     known : mapping of str to float
-        Nominal parameters by name: the mass is assumed where a record does not determine it, and
-        each can be fixed by its name alone.
+        Nominal parameters by name. The mass is assumed if a record does not determine it, and each
+        can be fixed by its name alone.
     columns : Columns
-        How the tables of this valve are written.
+        Format of the tables of this valve.
     settings : mapping of str to object
-        Settings of the identification by the names of the node's parameters, as
-        ``timing_uncertainty`` or ``fixed.mass``; without those that are not given.
+        The given settings of the identification by the names of the node's parameters, such as
+        ``timing_uncertainty`` or ``fixed.mass``.
     survey : mapping of str to object
-        Settings of a first survey that are given, as ``packing``.
+        The given settings of a first survey, such as ``packing``.
     assumed : tuple of str
-        Fields of the valve on which forces depend, and which the file does not state.
+        Fields of the valve that affect forces and that the file does not state.
     """
 
     valve: Valve
@@ -107,9 +107,9 @@ class ValveFile:
 
     @property
     def stated(self) -> dict[str, float]:
-        """What can be compared with a result: neither fixed values nor an assumed mass.
+        """Nominal values to compare with a result, without fixed values and an assumed mass.
 
-        ``IdentificationSettings(stated=described.stated)`` does.
+        Use ``IdentificationSettings(stated=described.stated)`` for the comparison.
         """
         assumed = self.settings.get("assumed_mass")
         return {
@@ -122,7 +122,7 @@ class ValveFile:
 
 
 def _number(key: str, value: object) -> float:
-    """Return a value as a float; YAML reads 2e5 as text and 2.0e+5 as a number."""
+    """Convert a value to float; YAML reads 2e5 as text and 2.0e+5 as a number."""
     if not isinstance(value, bool):
         try:
             return float(value)  # type: ignore[arg-type]
@@ -144,7 +144,7 @@ def _require_possible(known: Mapping[str, float]) -> None:
 
 
 def _blocks(content: Mapping[Any, Any], place: str = "") -> Iterator[tuple[str, Any]]:
-    """Yield each node's place and its parameters; places may be nested."""
+    """Yield the name and the parameters of each node; names may be nested."""
     for key, value in content.items():
         if key == _BLOCK:
             yield place, value
@@ -177,9 +177,9 @@ def _of_node(content: Mapping[Any, Any], valve: str | None) -> Mapping[Any, Any]
 
 
 def _flat(content: Mapping[Any, Any], is_shared: bool) -> dict[str, Any]:
-    """Return all keys with dots between their levels; refuse unknown ones.
+    """Return all keys with dots between their levels; refuse unknown keys.
 
-    In a file that is shared with nodes of other packages, only those that resemble a known one.
+    In a file shared with nodes of other packages, only keys that resemble a known key are refused.
     """
     values: dict[str, Any] = {}
     for key, value in content.items():
@@ -201,7 +201,7 @@ def _flat(content: Mapping[Any, Any], is_shared: bool) -> dict[str, Any]:
 
 
 def _read(setting: Setting, value: object) -> Any:
-    """Return a value as its setting demands it; None where it stands for "not given"."""
+    """Convert a value to the type of its setting; None if it means "not given"."""
     if setting.choices:
         text = setting.spell(str(value))
         if text not in setting.choices:
@@ -239,7 +239,7 @@ def _described(values: Mapping[str, Any]) -> ValveFile:
 def read_valve_file(path: str | os.PathLike[str], valve: str | None = None) -> ValveFile:
     r"""Read a valve from YAML: ``diaphragm_area`` and further known values, in SI units.
 
-    A file of parameters of ROS 2 nodes describes a valve too: what it gives to every node, or to
+    A parameter file of ROS 2 nodes also describes a valve, by the parameters for all nodes or for
     ``identifier``.
 
     Parameters
@@ -247,17 +247,17 @@ def read_valve_file(path: str | os.PathLike[str], valve: str | None = None) -> V
     path : path
         The file.
     valve : str, optional
-        Namespace of the valve in a file of several.
+        Namespace of the valve in a file of several valves.
 
     Raises
     ------
     ValueError
-        In one line: the file, the key, and the rule that it breaks.
+        In one line: the file, the key, and the violated rule.
 
     Returns
     -------
     ValveFile
-        The valve, and what else the file names.
+        The valve, and the other content of the file.
 
     Examples
     --------
@@ -275,9 +275,9 @@ def read_valve_file(path: str | os.PathLike[str], valve: str | None = None) -> V
 
 
 def with_columns(text: str, columns: Columns) -> str:
-    """Return the text of a valve file with another section ``columns:``; its comments stay.
+    """Return the text of a valve file with a new section ``columns:``; comments are preserved.
 
-    Raises ValueError if the text is no YAML of a valve.
+    Raises ValueError if the text is not the YAML of a valve.
     """
     try:
         root = yaml.compose(text, yaml.SafeLoader)
@@ -305,7 +305,7 @@ def with_columns(text: str, columns: Columns) -> str:
 
 
 def _last_line(node: yaml.Node) -> int:
-    """Return the last line of a node; the end mark of a block is beyond it."""
+    """Return the last line of a node; the end mark of a block lies beyond it."""
     if isinstance(node, yaml.CollectionNode) and not node.flow_style and node.value:
         last = node.value[-1]
         return _last_line(last[1] if isinstance(last, tuple) else last)
@@ -313,7 +313,7 @@ def _last_line(node: yaml.Node) -> int:
 
 
 def _pairs(node: yaml.Node | None) -> list[tuple[yaml.Node, yaml.Node]]:
-    """Return the keys of a valve file with their values, those of its first node's parameters."""
+    """Return the keys and values of a valve file, or of the parameters of its first node."""
     if not isinstance(node, yaml.MappingNode):
         raise ValueError("expected lines such as 'diaphragm_area: 0.0445'")
     for key, value in node.value:

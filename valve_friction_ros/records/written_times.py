@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Times as tables write them: numbers since some beginning, dates in many forms, times of day."""
+"""Times in tables: numbers since an origin, dates in many formats, and times of day."""
 
 import re
 from collections.abc import Iterable, Sequence
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 NO_TIME = np.iinfo(np.int64).min
-"""Stands for a text that is no time; what NaT is in nanoseconds."""
+"""Marks a text that is not a time; the value of NaT in ns."""
 
 _MONTHS = {
     "januar": "Jan", "jän": "Jan", "februar": "Feb", "märz": "Mar", "mär": "Mar", "mrz": "Mar",
@@ -32,11 +32,11 @@ _MONTHS = {
     "september": "Sep", "oktober": "Oct", "okt": "Oct", "november": "Nov", "dezember": "Dec",
     "dez": "Dec",
 }  # fmt: skip
-"""German months, beside those that begin as the English ones do."""
+"""German months with their English abbreviations; others begin as in English."""
 
 _OFFSETS = {"UTC": "+0000", "GMT": "+0000", "CET": "+0100", "MEZ": "+0100", "CEST": "+0200",
             "MESZ": "+0200"}  # fmt: skip
-"""Zones by names that mean one offset only; American ones do not (CST, EST, IST)."""
+"""Zone names with a unique offset; American names are ambiguous (CST, EST, IST)."""
 
 _JAVA = re.compile(
     r"^[A-Z][a-z]{2} ([A-Z][a-z]{2}) (\d{1,2}) (\d\d:\d\d:\d\d) ([A-Z]{3,4}) (\d{4})$"
@@ -63,13 +63,13 @@ _DURATION = re.compile(r"(?:\d+ days? )?\d{1,3}:\d\d:\d\d(?:[.,]\d+)?")
 _REORDERED = re.compile(
     r"%(?P<first>[dm])(?P<mark>[./-])%[dm](?P=mark)%Y %H:%M:%S(?:(?P<point>[.,])%f)?"
 )
-"""Forms whose parts are those of ISO 8601 in another order, where all have two digits."""
+"""Formats with the parts of ISO 8601 in another order, if all have two digits."""
 
 _HOURS_ONLY = re.compile(r":\d\d(?:\.\d+)?[+\-]\d\d$")
 
 
 def is_date(text: str) -> bool:
-    """Return whether a text is a date and a time in a form that is known."""
+    """Return whether a text is a date with a time in a known format."""
     text = _JAVA.sub(r"\2-\1-\5 \3 \4", text.strip())
     return len(text) < 100 and _STAMP.fullmatch(text) is not None
 
@@ -86,27 +86,27 @@ def is_time_of_day(text: str) -> bool:
 
 
 def in_one(parts: Sequence[str]) -> str:
-    """Return a date, a time of the day and, if there are any, its milliseconds as one text."""
+    """Join a date, a time of day and optional milliseconds."""
     day, clock, *rest = (part.strip() for part in parts)
     return f"{day} {clock}" + "".join(f".{one:0>3}" for one in rest)
 
 
 @dataclass(frozen=True)
 class TimeForm:
-    """How times are written.
+    """Format of times.
 
     Attributes
     ----------
     formats : tuple of str
-        Forms of dates (strptime), the most frequent first; none for numbers and durations.
+        Formats of dates (strptime), the most frequent first; empty for numbers and durations.
     zone : str
-        Zone of dates that name none, and of numbers that count days.
+        Zone of dates without a zone, and of numbers in days.
     unit : str
-        Of numbers.
+        Unit of numbers.
     origin : int
-        What numbers begin at, ns since 1970.
+        Origin of numbers, ns since 1970.
     has_zone : bool
-        Whether the dates name their zone.
+        Whether the dates include their zone.
     """
 
     formats: tuple[str, ...] = ()
@@ -117,7 +117,7 @@ class TimeForm:
 
 
 class DateForms(NamedTuple):
-    """What the dates of a column can be: formats with the day first, with the month first."""
+    """Possible formats of the dates in a column: with the day first, with the month first."""
 
     day_first: tuple[str, ...]
     month_first: tuple[str, ...]
@@ -125,7 +125,7 @@ class DateForms(NamedTuple):
 
 
 def date_forms(texts: Sequence[str]) -> DateForms | None:
-    """Find the forms that fit all texts; None if one is no date with a time."""
+    """Find the formats that fit all texts; None if a text is not a date with a time."""
     day: dict[str, None] = {}
     month: dict[str, None] = {}
     has_zone = True
@@ -146,7 +146,7 @@ def date_forms(texts: Sequence[str]) -> DateForms | None:
         month_possible &= int(found["first"]) <= 12
         is_american = found["half"] and found["s2"] == "/" and len(found["first"]) == 1
         if is_american and not found["second"].startswith("0") and len(found["second"]) == 1:
-            day_possible = False  # 7/1/2026 2:00 PM; where the day is first, one is 1/07
+            day_possible = False  # 7/1/2026 2:00 PM; with the day first it would be 1/07
         month[_format(found, "%m", "%d")] = None
     return DateForms(
         _with_and_without_fraction(day) if day_possible else (),
@@ -156,7 +156,7 @@ def date_forms(texts: Sequence[str]) -> DateForms | None:
 
 
 def _with_and_without_fraction(forms: Iterable[str]) -> tuple[str, ...]:
-    """Add the forms of whole seconds, whose fraction some programs leave out, and the reverse."""
+    """Add each format with and without fractions, which some programs omit for whole seconds."""
     known = dict.fromkeys(forms)
     for form in list(known):
         known[re.sub(r"[.,:]%f", "", form) if "%f" in form else form.replace("%S", "%S.%f")] = None
@@ -164,7 +164,7 @@ def _with_and_without_fraction(forms: Iterable[str]) -> tuple[str, ...]:
 
 
 def _format(found: re.Match[str], first: str, second: str) -> str:
-    """Return the form of a date that was found, for strptime."""
+    """Return the strptime format of a recognized date."""
     if found["iso"]:
         date = f"%Y{found['s1']}%m{found['s1']}%d"
     elif found["compact"]:
@@ -187,7 +187,7 @@ def _format(found: re.Match[str], first: str, second: str) -> str:
 
 
 def _normal(text: str) -> str:
-    """Return a date in words that strptime knows: English months, offsets."""
+    """Return a date in terms that strptime knows: English months, offsets."""
     text = _JAVA.sub(r"\2-\1-\5 \3 \4", text.strip())
     if text.isascii() and not any(map(str.isalpha, text)):
         return text
@@ -206,10 +206,10 @@ def _ns(times: "pd.DatetimeIndex | pd.TimedeltaIndex") -> NDArray[np.int64]:
 
 
 class WrittenTimes:
-    """Reads the times of a column in their order, ns.
+    """Reads the times of a column in order, ns.
 
-    A local time that comes twice, when clocks are put back, is the second where the times would
-    otherwise go back. What is no time is `NO_TIME`.
+    A local time that occurs twice, when clocks are set back, is taken as the second occurrence if
+    the times would otherwise go back. Other texts become `NO_TIME`.
     """
 
     def __init__(self, form: TimeForm) -> None:
@@ -218,12 +218,12 @@ class WrittenTimes:
         self._before = NO_TIME
 
     def __call__(self, cells: "pd.Series[Any]", numbers: NDArray[np.float64]) -> NDArray[np.int64]:
-        """Convert the cells of a block; `numbers` are those that are written as such."""
+        """Convert the cells of a block; `numbers` are the values of those that are numbers."""
         import pandas as pd  # noqa: PLC0415 - slow to import
 
         if self._form.unit:
             size = NANOSECONDS[self._form.unit]
-            later = max(self._form.origin, 0)  # in whole ns: a double of a date rounds to 256 ns
+            later = max(self._form.origin, 0)  # in whole ns: a float of a date rounds to 256 ns
             with np.errstate(over="ignore"):
                 scaled = numbers * size + (self._form.origin - later)
             known = np.isfinite(scaled) & (np.abs(scaled) < 9e18 - later)
@@ -268,7 +268,7 @@ class WrittenTimes:
         return times.tz_localize(None) if is_utc else times
 
     def _in_iso(self, texts: "pd.Series[str]") -> "pd.Series[Any]":
-        """Convert dates of the first form; pandas reads ISO 8601 ten times as fast as others."""
+        """Convert dates of the first format; pandas reads ISO 8601 ten times faster than others."""
         import pandas as pd  # noqa: PLC0415 - slow to import
 
         form = self._form.formats[0]
@@ -321,17 +321,16 @@ _EPOCHS: tuple[tuple[str, float], ...] = (
     ("d", -719_529.0),  # MATLAB: days since the year 0
     ("s", -2_082_844_800.0),  # LabVIEW: seconds since 1904
 )
-"""What numbers of a clock count: their unit, and in it the time from their beginning to 1970."""
+"""Numeric clocks: unit, and origin relative to 1970 in this unit."""
 
 _FINEST, _COARSEST = 1e-5, 30.0
-"""Sampling periods, s, of a clock whose unit is not stated. Chosen: beyond any of a record."""
+"""Range of sampling periods, s, for a clock without a stated unit. Chosen: beyond any record."""
 
 
 def clock_of(first: float, step: float) -> tuple[str, int] | None:
-    """Find the clock of which `first` is a date of our time, and `step` a sampling period.
+    """Find the clock for which `first` is a present-day date and `step` a sampling period.
 
-    Return its unit and the time that it begins at, ns since 1970; None for a time that begins with
-    the record.
+    Return its unit and its origin, ns since 1970; None for a time that starts with the record.
     """
     for unit, since in _EPOCHS:
         size = NANOSECONDS[unit] / 1e9

@@ -7,4 +7,4 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Bags of ROS 2 in and out, MCAP and SQLite3; no ROS."""
+"""Reading and writing of ROS 2 bags, MCAP and SQLite3; no ROS."""

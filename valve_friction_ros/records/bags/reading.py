@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Recordings in rosbag2 bags, read without ROS, by the same buffer as in the node."""
+"""Reading of rosbag2 bags without ROS, through the same buffer as in the node."""
 
 import contextlib
 import io
@@ -55,15 +55,15 @@ from valve_friction_ros.streams.record_buffer import RecordBuffer
 from valve_friction_ros.streams.samples import joint_position, only_joint, uniform_recording
 
 _HEADER = struct.Struct(">16xH10xI")
-"""Page size, where 1 stands for 65536, and number of pages: https://sqlite.org/fileformat2.html"""
+"""Page size, with 1 for 65536, and number of pages: https://sqlite.org/fileformat2.html"""
 
 
 class SqliteFile:
-    """A SQLite3 file, read row by row; if it is damaged, until SQLite meets the damage.
+    """A SQLite3 file, read row by row; a damaged file is read up to the damage.
 
-    Rows that are still in a write-ahead log beside the file are read as well. `path` is the file
-    that messages name, `file` the same or what was unpacked of it. Without `salvage`, a damaged
-    file raises DamagedFileError, now or while its messages are gone through.
+    Rows still in the write-ahead log next to the file are read too. `path` is the file named in
+    messages, `file` the same file or its unpacked content. Without `salvage`, a damaged file raises
+    DamagedFileError, at once or during iteration over its messages.
     """
 
     def __init__(self, path: Path, file: Path, salvage: bool) -> None:
@@ -79,7 +79,7 @@ class SqliteFile:
         if is_logged and not salvage:
             raise DamagedFileError(path, "it was not closed by its recorder")
         if surplus and not is_logged and salvage:
-            # SQLite would fill up the last page with zeros, and believe them.
+            # SQLite would pad the last page with zeros and read these as data.
             self._folder = TemporaryDirectory()
             file = Path(shutil.copy(file, self._folder.name))
             os.truncate(file, there * page_size)
@@ -92,7 +92,7 @@ class SqliteFile:
         connection = sqlite3.connect(self._uri, uri=True)
         try:
             if self._salvage:
-                # Else SQLite refuses to open a file that is shorter than its header says.
+                # Otherwise SQLite refuses a file that is shorter than its header says.
                 connection.execute("PRAGMA writable_schema = ON")
             yield from connection.execute(query, values)
         except sqlite3.Error as error:
@@ -102,7 +102,7 @@ class SqliteFile:
             connection.close()
 
     def messages(self, topics: Collection[Topic]) -> Iterator[tuple[Topic, bytes]]:
-        """Go through the messages of some topics in the order of their recording."""
+        """Yield the messages of some topics in the order of recording."""
         wanted = {number: topic for number, topic in self._topics.items() if topic in topics}
         order = "id" if self._salvage else "timestamp, id"
         query = (
@@ -114,14 +114,15 @@ class SqliteFile:
                 yield wanted[number], data
 
     def close(self) -> None:
-        """Remove what was copied."""
+        """Remove the temporary copy."""
         if self._folder is not None:
             self._folder.cleanup()
 
 
 _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK = 0x03, 0x04, 0x05, 0x06
 _ENDS = {0x00, 0x0F}
-"""No record of MCAP, but what a disk leaves after a loss of power; and the end of the data."""
+"""Zeros, which a disk leaves after a loss of power and which are not a record of MCAP; and the end
+of the data."""
 _MAGIC_SIZE = 8
 _WANTED = {_SCHEMA, _CHANNEL, _MESSAGE, _CHUNK}
 _MESSAGE_HEADER = struct.Struct("<HIQQ")
@@ -134,7 +135,7 @@ def _text(stream: io.BytesIO) -> str:
 
 
 def _chunk_content(chunk: bytes) -> bytes:
-    """Uncompressed content of a chunk; of a cut chunk, the part that is there; empty if damaged."""
+    """Return the uncompressed content of a chunk; partial if truncated, empty if damaged."""
     stream = io.BytesIO(chunk)
     try:
         *_, size, checksum = _CHUNK_HEADER.unpack(stream.read(_CHUNK_HEADER.size))
@@ -152,9 +153,9 @@ def _chunk_content(chunk: bytes) -> bytes:
 
 
 def _records(stream: BinaryIO, size: int) -> Iterator[tuple[int, bytes]]:
-    """Go through records of MCAP, opcode and content, up to the first that is not whole.
+    """Yield opcode and content of MCAP records up to the first incomplete record.
 
-    A chunk is opened; of one that is cut, what there is of it comes last.
+    Chunks are unpacked; the readable part of a truncated chunk comes last.
     """
     while len(head := stream.read(9)) == 9:
         opcode, length = struct.unpack("<BQ", head)
@@ -175,7 +176,7 @@ def _records(stream: BinaryIO, size: int) -> Iterator[tuple[int, bytes]]:
 
 
 class SalvagedMcap:
-    """An MCAP file read from its beginning to its end or first damage, without its index."""
+    """An MCAP file, read without its index from the beginning to the end or first damage."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -200,7 +201,7 @@ class SalvagedMcap:
             yield from _records(stream, self._path.stat().st_size)
 
     def messages(self, topics: Collection[Topic]) -> Iterator[tuple[Topic, bytes]]:
-        """Go through the messages of some topics in the order of their recording."""
+        """Yield the messages of some topics in the order of recording."""
         wanted = {number: topic for number, topic in self._channels.items() if topic in topics}
         for opcode, content in self._walk():
             if opcode == _MESSAGE and len(content) >= _MESSAGE_HEADER.size:
@@ -213,12 +214,12 @@ _STORAGE = re.compile(r"\.(mcap|db3)(\.zstd)?$")
 
 
 def _in_order(path: Path) -> list[str | int]:
-    """Key that sorts bag_2 before bag_10."""
+    """Return a sort key that puts bag_2 before bag_10."""
     return [int(part) if part.isdecimal() else part for part in re.split(r"(\d+)", path.name)]
 
 
 def _named_files(folder: Path) -> list[str] | None:
-    """Names of the files in a bag's metadata; None where there is none that can be read."""
+    """Return the names of the files in the metadata of a bag; None without readable metadata."""
     try:
         content = yaml.safe_load((folder / "metadata.yaml").read_text(encoding="utf-8"))
         names = content["rosbag2_bagfile_information"]["relative_file_paths"]
@@ -228,9 +229,9 @@ def _named_files(folder: Path) -> list[str] | None:
 
 
 def storage_files(path: Path) -> tuple[list[Path], list[str]]:
-    """Return the storage files of a bag in the order of time, and notes on what is missing.
+    """Return the storage files of a bag in order of time, and notes on missing files.
 
-    Raises ValueError if there is none.
+    Raises ValueError if there are no storage files.
     """
     if not path.exists():
         raise ValueError(f"{path}: no such file or folder")
@@ -258,7 +259,7 @@ def storage_files(path: Path) -> tuple[list[Path], list[str]]:
 
 @contextlib.contextmanager
 def _unpacked(path: Path) -> Iterator[Path]:
-    """Unpack a file that was compressed as a whole; of a cut file, the part that is there."""
+    """Unpack a file that was compressed as a whole; a truncated file only as far as possible."""
     if not first_bytes(path).startswith(ZSTD):
         yield path
         return
@@ -274,7 +275,7 @@ def _unpacked(path: Path) -> Iterator[Path]:
 
 
 def _is_mcap(path: Path, start: bytes) -> bool:
-    """Return True for MCAP, False for SQLite3, by the first bytes; refuse anything else."""
+    """Return True for MCAP and False for SQLite3, by the first bytes; refuse other formats."""
     if start.startswith((MCAP, SQLITE)):
         return start.startswith(MCAP)
     if not start and path.stat().st_size:
@@ -288,11 +289,11 @@ def _is_mcap(path: Path, start: bytes) -> bool:
 
 @contextlib.contextmanager
 def opened(path: Path, salvage: bool) -> Iterator[Storage]:
-    """Open a storage file, compressed or not; its first bytes give its format.
+    """Open a storage file, compressed or not; its first bytes determine its format.
 
-    With `salvage` it is read without its index as far as it goes. Raises ValueError if it is no
-    storage file of ROS 2, and DamagedFileError if it cannot be read without salvage, now or while
-    its messages are gone through.
+    With `salvage` it is read without its index as far as possible. Raises ValueError if it is not a
+    storage file of ROS 2. Raises DamagedFileError if it cannot be read without salvage, at once or
+    during iteration over its messages.
     """
     with _unpacked(path) as file:
         is_mcap = _is_mcap(path, first_bytes(file))
@@ -305,11 +306,11 @@ def opened(path: Path, salvage: bool) -> Iterator[Storage]:
 
 
 _ALL = 1e9
-"""A window longer than any recording, s."""
+"""Window longer than any recording, s."""
 
 
 class ValveFeed:
-    """Fills a `RecordBuffer` from recorded messages of a valve whose topics are both there.
+    """Fills a `RecordBuffer` from recorded messages of a valve with both topics.
 
     Without a `joint`, the stem is the only joint, or the joint called `stem`.
     """
@@ -328,7 +329,7 @@ class ValveFeed:
 
     @property
     def inputs(self) -> Mapping[Topic, Callable[[bytes], None]]:
-        """What takes the messages of which topic."""
+        """The function that takes the messages of each topic."""
         return {
             Topic(name, kind): take
             for name, kind, take in (
@@ -339,7 +340,7 @@ class ValveFeed:
         }
 
     def _read(self, data: bytes, topic: str | None, kind: str) -> tuple[int, Any] | None:
-        """Decode a message; None if it cannot be, or its stamp is outside the stretch."""
+        """Decode a message; None if this fails or the stamp is outside the stretch."""
         try:
             message = decode(data, kind)
         except UndecodableError:
@@ -370,7 +371,7 @@ class ValveFeed:
         self._buffer.add_position(stamp, position)
 
     def notes(self) -> list[str]:
-        """Return which messages were left out, and why."""
+        """Return notes on the messages left out, with the reasons."""
         notes = [
             f"{count} messages of {topic} cannot be decoded as its type, and were left out"
             for topic, count in self._undecodable.items()
@@ -381,9 +382,9 @@ class ValveFeed:
         return notes
 
     def recording(self) -> Recording:
-        """Bring both signals onto one grid, as the node does.
+        """Resample both signals on a common grid, as the node does.
 
-        Raises RefusalError if the samples make no record; the remedies are those for a file.
+        Raises RefusalError if the samples do not form a record, with remedies that suit a file.
         """
         if self._refusal is not None:
             raise RefusalError(self._refusal)
@@ -437,7 +438,7 @@ def _read(
     choice: TopicChoice,
     stretch: Stretch,
 ) -> list[tuple[ValveTopics, ValveFeed]]:
-    """Read all valves from a bag; of damaged files, the part that can be salvaged."""
+    """Read all valves from a bag; from damaged files only the part that can be salvaged."""
     with contextlib.ExitStack() as stack:
         storages = [stack.enter_context(opened(file, file in damaged)) for file in files]
         topics = {topic for storage in storages for topic in storage.topics}
@@ -458,14 +459,14 @@ def read_bag(
     choice: TopicChoice | None = None,
     stretch: Stretch | None = None,
 ) -> tuple[RecordedValve, ...]:
-    """Read the recordings of all valves in a bag, by namespace, in one pass through its messages.
+    """Read the recordings of all valves in a bag, by namespace, in one pass over its messages.
 
-    The messages go through the node's own buffer by their header stamps, in the order in which
-    each topic was recorded, so that they give the numbers that the node gave.
+    The messages pass through the buffer of the node by header stamp, in the order of recording of
+    each topic, so that they give the same numbers as the node.
 
-    `path` is the folder of a bag, or one of its files: MCAP or SQLite3, compressed or not. Without
-    its metadata or index, or cut off, it is read as far as it goes. Raises ValueError, one line
-    with the remedy, if the file is no bag of ROS 2, or holds no valve.
+    `path` is the folder of a bag, or one of its files: MCAP or SQLite3, compressed or not. If
+    metadata or index are missing, or the file is truncated, it is read as far as possible. Raises
+    ValueError, one line with the remedy, if the file is not a bag of ROS 2 or contains no valve.
     """
     choice, stretch = choice or TopicChoice(), stretch or Stretch()
     files, notes = storage_files(path)

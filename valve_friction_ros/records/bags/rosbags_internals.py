@@ -7,12 +7,12 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Messages of a bag, and private names of rosbags, which are in this file only.
+"""Messages of a bag, and all uses of private names of rosbags.
 
-Checked with rosbags 0.11.9; `test_bags_of_valves.py` names what a newer version lacks.
+Checked with rosbags 0.11.9; `test_bags_of_valves.py` reports what a newer version lacks.
 
-- `McapReader`: the documented `Reader` takes the format of a file from its ending, and refuses an
-  MCAP file without index whose receive times go back, as those of several topics may.
+- `McapReader`: the documented `Reader` infers the format of a file from its ending. It also refuses
+  an MCAP file without index whose receive times go back, as those of several topics may.
 - The decoders of `Typestore.get_msgdef`: the documented `deserialize_cdr` refuses a message with
   bytes after its end, which rclpy's serialisation may leave.
 """
@@ -31,7 +31,7 @@ from rosbags.typesys import Stores, get_typestore
 from valve_friction_ros.records.bags.topics import ZSTD, DamagedFileError, Topic
 
 TYPES = get_typestore(Stores.ROS2_JAZZY)
-"""Message types; those of pressure and stem have not changed since ROS 2 began."""
+"""Message types; those of pressure and stem have never changed in ROS 2."""
 
 _DAMAGE = (
     ReaderError,
@@ -47,11 +47,11 @@ _DAMAGE = (
     TypeError,
     ValueError,
 )
-"""What `McapReader` lets through when a file is damaged."""
+"""Exceptions that `McapReader` raises for a damaged file."""
 
 
 def decoded(body: bytes, kind: str, little_endian: bool) -> Any:
-    """Decode the body of a CDR message, whatever follows its end."""
+    """Decode the body of a CDR message, ignoring bytes after its end."""
     definition = TYPES.get_msgdef(kind)
     read = definition.deserialize_cdr_le if little_endian else definition.deserialize_cdr_be
     message, _ = read(body, 0, definition.cls, TYPES)
@@ -59,10 +59,10 @@ def decoded(body: bytes, kind: str, little_endian: bool) -> Any:
 
 
 class McapFile:
-    """An undamaged MCAP file: `file`, which is `path` or what was unpacked of it.
+    """An undamaged MCAP file: `file`, which is `path` or its unpacked content.
 
-    Raises DamagedFileError, which names `path`, if it is damaged, now or while its messages are
-    gone through.
+    Raises DamagedFileError, which names `path`, if it is damaged, at once or during iteration over
+    its messages.
     """
 
     def __init__(self, path: Path, file: Path) -> None:
@@ -80,7 +80,7 @@ class McapFile:
         self.topics: Collection[Topic] = set(self._topics.values())
 
     def messages(self, topics: Collection[Topic]) -> Iterator[tuple[Topic, bytes]]:
-        """Go through the messages of some topics in the order of their recording."""
+        """Yield the messages of some topics in the order of recording."""
         reader = self._reader
         connections = [each for each in reader.connections if self._topics[each.id] in topics]
         if not connections:
@@ -102,13 +102,13 @@ _NANOSECONDS = 1_000_000_000
 
 
 class UndecodableError(ValueError):
-    """Bytes that are no message of their topic's type."""
+    """Bytes that are not a message of the type of their topic."""
 
 
 def decode(data: bytes, kind: str) -> Any:
     """Decode a message, compressed by its recorder or not.
 
-    Raises UndecodableError if the bytes are no such message.
+    Raises UndecodableError if the bytes are not such a message.
     """
     if data.startswith(ZSTD):
         try:
@@ -129,13 +129,13 @@ def encode(message: object, kind: str) -> bytes:
 
 
 def stamp_of(message: Any) -> int:
-    """Header stamp of a message, ns."""
+    """Return the header stamp of a message, ns."""
     stamp = message.header.stamp
     return int(stamp.sec) * _NANOSECONDS + int(stamp.nanosec)
 
 
 def header(stamp: int) -> Any:
-    """Header with a stamp in ns."""
+    """Return a header with a stamp, ns."""
     seconds, nanoseconds = divmod(stamp, _NANOSECONDS)
     time = TYPES.types["builtin_interfaces/msg/Time"](sec=seconds, nanosec=nanoseconds)
     return TYPES.types["std_msgs/msg/Header"](stamp=time, frame_id="")

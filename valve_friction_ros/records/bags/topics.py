@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""What tells a bag, what its files offer, and which of its topics belong to which valve."""
+"""Recognition of bags, the interface of their files, and the topics of each valve."""
 
 import contextlib
 from collections.abc import Collection, Iterable, Iterator
@@ -20,10 +20,10 @@ PRESSURE_TYPE = "sensor_msgs/msg/FluidPressure"
 STEM_TYPE = "sensor_msgs/msg/JointState"
 
 _OWN_NAMES = {PRESSURE_TYPE: "actuator_pressure", STEM_TYPE: "stem_state"}
-"""What the topics are called where this package's nodes made them."""
+"""Names of the topics of this package."""
 
 _MOST_LISTED = 12
-"""Topics that a message lists."""
+"""Largest number of topics in a message."""
 
 
 class Topic(NamedTuple):
@@ -35,17 +35,17 @@ class Topic(NamedTuple):
 
 @dataclass(frozen=True)
 class TopicChoice:
-    """Topics, joint and valve to read, where a bag leaves them open.
+    """Topics, joint and valve to read from an ambiguous bag.
 
     Attributes
     ----------
     pressure, stem : str or None
-        Topic of the pressure and of the stem; without a leading slash: its name within the
-        namespace of each valve. None: found by its type.
+        Topics of pressure and stem; without a leading slash the name is relative to the namespace
+        of each valve. None: found by type.
     joint : str or None
-        Name of the stem's joint; None: the only one, or the one called `stem`.
+        Name of the joint of the stem; None: the only joint, or the joint called `stem`.
     valve : str or None
-        Namespace of the one valve that is wanted; None: all.
+        Namespace of the single valve to read; None: all.
     """
 
     pressure: str | None = None
@@ -55,7 +55,7 @@ class TopicChoice:
 
 
 class StreamNames(NamedTuple):
-    """Topics that a bag is written with, and the name of the stem's joint."""
+    """Topics of a bag to write, and the name of the joint of the stem."""
 
     pressure: str
     stem: str
@@ -63,7 +63,7 @@ class StreamNames(NamedTuple):
 
 
 class ValveTopics(NamedTuple):
-    """A valve in a bag: its namespace, and its topics, of which one may be missing."""
+    """A valve in a bag: its namespace and its topics, one of which may be missing."""
 
     name: str
     pressure: str | None
@@ -71,7 +71,7 @@ class ValveTopics(NamedTuple):
 
     @property
     def missing(self) -> str | None:
-        """What has to be said about a missing topic; None if both are there."""
+        """Message about a missing topic; None if both are present."""
         if self.pressure is None:
             return f"no {PRESSURE_TYPE} topic beside {self.stem}"
         if self.stem is None:
@@ -90,7 +90,7 @@ def _listed(topics: Iterable[Topic]) -> str:
 
 
 def _candidates(topics: Collection[Topic], kind: str, asked: str | None) -> dict[str, list[str]]:
-    """Topics of a type, or those that were asked for, by namespace."""
+    """Return the topics of a type, or the requested topics, by namespace."""
     names = sorted({topic.name for topic in topics if topic.type == kind})
     if asked is None:
         found = [(_namespace(name), name) for name in names]
@@ -109,7 +109,7 @@ def _candidates(topics: Collection[Topic], kind: str, asked: str | None) -> dict
 
 
 def _one(names: list[str], kind: str, option: str) -> str | None:
-    """Choose among topics of one type in one namespace."""
+    """Choose one of the topics of a type in a namespace."""
     own = [name for name in names if name.rpartition("/")[2] == _OWN_NAMES[kind]]
     if len(names) > 1 and len(own) != 1:
         raise ValueError(f"several {kind} topics ({', '.join(names)}): choose one by {option}")
@@ -122,7 +122,7 @@ def _common_namespace(*namespaces: str) -> str:
 
 
 def _paired(pressures: dict[str, list[str]], stems: dict[str, list[str]]) -> list[ValveTopics]:
-    """Pair the topics of each namespace; a single pressure and a single stem belong together."""
+    """Pair the topics of each namespace; a single pressure and a single stem form a pair."""
     if len(pressures) == len(stems) == 1:
         namespace = _common_namespace(*pressures, *stems)
         pressures, stems = ({namespace: next(iter(each.values()))} for each in (pressures, stems))
@@ -139,18 +139,18 @@ def _paired(pressures: dict[str, list[str]], stems: dict[str, list[str]]) -> lis
 def _is_a_valve(valve: ValveTopics) -> bool:
     """Return whether a pressure or a stem alone belongs to a valve.
 
-    Any other sensor of pressure and any other joint has these types too; the name decides.
+    Other pressure sensors and other joints have the same types, so the name decides.
     """
     names = {topic.rpartition("/")[2] for topic in (valve.pressure, valve.stem) if topic}
     return valve.missing is None or bool(names & set(_OWN_NAMES.values()))
 
 
 def valves_in(topics: Collection[Topic], choice: TopicChoice) -> list[ValveTopics]:
-    """Find the valves of a bag, by namespace; one of this package's own topics may be missing.
+    """Find the valves of a bag by namespace; one of the topics of this package may be missing.
 
-    A valve is a namespace with a topic of each type; where there is one of each in all the bag,
-    or one of each is named, they are a valve wherever they are. Raises ValueError, with what the
-    bag holds, if there is none, or if the topics cannot be told apart.
+    A valve is a namespace with a topic of each type. If the whole bag has only one of each, or one
+    of each is named, they form a valve in any namespace. Raises ValueError, with the content of the
+    bag, if there is no valve or the topics are ambiguous.
     """
     pressures = _candidates(topics, PRESSURE_TYPE, choice.pressure)
     stems = _candidates(topics, STEM_TYPE, choice.stem)
@@ -175,17 +175,16 @@ def valves_in(topics: Collection[Topic], choice: TopicChoice) -> list[ValveTopic
 
 
 _LIBRARIES = ("rosbags", "lz4", "backports")
-"""Top-level modules. rosbags itself asks for the others."""
+"""Top-level modules for bags; rosbags itself requires the others."""
 
 _REMEDY = "run `pip install 'rosbags>=0.11.9,<0.12' lz4 backports.zstd`"
 
 
 @contextlib.contextmanager
 def bag_libraries() -> Iterator[None]:
-    """Import modules of this room that need rosbags, lz4 and backports.zstd within this block.
+    """Guard the import of modules of this folder that need rosbags, lz4 and backports.zstd.
 
-    Raises ValueError, which says what to install, if one of these is not there, or is another
-    version.
+    Raises ValueError, with what to install, if one of these is missing or has another version.
     """
     try:
         yield
@@ -207,13 +206,13 @@ _SUFFIXES = (".mcap", ".db3", ".zstd", ".bag")
 
 
 def first_bytes(path: Path) -> bytes:
-    """Return the bytes of a file that tell its format."""
+    """Return the first bytes of a file, which determine its format."""
     with path.open("rb") as stream:
         return stream.read(16)
 
 
 def is_bag(path: Path) -> bool:
-    """Return whether a file or folder is a bag, by its content or its ending, and no CSV file."""
+    """Return whether a file or folder is a bag, by its content or ending."""
     if path.is_dir() or path.suffix in _SUFFIXES:
         return True
     try:
@@ -223,7 +222,7 @@ def is_bag(path: Path) -> bool:
 
 
 class DamagedFileError(Exception):
-    """A storage file that cannot be read as it should be; the file is its first argument."""
+    """A damaged storage file, which is the first argument."""
 
     def __init__(self, path: Path, cause: str) -> None:
         super().__init__(path, cause)
@@ -237,4 +236,4 @@ class Storage(Protocol):
     topics: Collection[Topic]
 
     def messages(self, topics: Collection[Topic]) -> Iterator[tuple[Topic, bytes]]:
-        """Go through the messages of some topics in the order of their recording."""
+        """Yield the messages of some topics in the order of recording."""

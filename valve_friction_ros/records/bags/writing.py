@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""A buffer's content as a bag, so that it can be kept, sent and identified again."""
+"""Writing of a buffer as a bag, which can be stored, sent and identified again."""
 
 import contextlib
 import errno
@@ -33,13 +33,13 @@ from valve_friction_ros.streams.record_buffer import Snapshot
 from valve_friction_ros.streams.samples import Samples
 
 VALVE_FILE = "valve.yaml"
-"""The description of the valve, in the folder of the bag."""
+"""File name of the valve description in the folder of the bag."""
 
 _VERSION: Final = 9
-"""Version of the metadata, that of ROS 2 Jazzy."""
+"""Version of the metadata, as in ROS 2 Jazzy."""
 
 _TAKEN = (errno.EEXIST, errno.ENOTEMPTY, errno.ENOTDIR)
-"""Errors of a rename onto a name that something has."""
+"""Errors when the target name of a rename exists."""
 
 _LARGEST_STAMP = (2**31 - 1) * 1_000_000_000
 
@@ -47,15 +47,15 @@ _NOTHING = np.zeros(0)
 
 _STAMP, _VALUE = struct.Struct("<iI"), struct.Struct("<d")
 _STAMP_PLACE = 4
-"""A header begins a message, behind four bytes of the encoding."""
+"""Offset of the header, which begins a message after four bytes of encoding."""
 _MARK = 1.2345e67
-"""Stands for the value of a sample."""
+"""Placeholder for the value of a sample."""
 
 
 def _messages(samples: Samples, message: object, kind: str) -> Iterator[tuple[int, str, bytes]]:
-    """Yield stamp, type and bytes of each sample: those of `message`, with stamp and value put in.
+    """Yield stamp, type and bytes of each sample, patching stamp and value into `message`.
 
-    Encoding each by itself would take five times as long.
+    Encoding each message separately would take five times as long.
     """
     data = bytearray(encode(message, kind))
     place = data.index(_VALUE.pack(_MARK))
@@ -97,7 +97,7 @@ def _write(folder: Path, snapshot: Snapshot, names: StreamNames) -> None:
 
 
 def _flush(folder: Path) -> None:
-    """Have the disk hold all of a folder before its name says that it is whole."""
+    """Flush a folder to disk before its final name marks it as complete."""
     for path in (*folder.iterdir(), folder):
         descriptor = os.open(path, os.O_RDONLY)
         try:
@@ -107,7 +107,7 @@ def _flush(folder: Path) -> None:
 
 
 def _moved(whole: Path, folder: Path, name: str) -> Path:
-    """Give a finished bag its name, or the first free one after it."""
+    """Move a finished bag to its name, numbered if the name is taken."""
     number, target = 1, folder / name
     while True:
         try:
@@ -128,17 +128,17 @@ def write_bag(
     settings: Mapping[str, Any],
     replaced: Path | None = None,
 ) -> Path:
-    """Write a snapshot as a bag of MCAP, with the stamps it was received with; return its path.
+    """Write a snapshot as an MCAP bag with the received stamps; return its path.
 
-    It is written in a hidden folder beside its place and then renamed, so that nobody reads
-    half a bag. The folder is made if it is not there; where the name is taken, a number is put
-    after it. Rejected samples are only counted, in the metadata. A valve file lies in the bag, with
-    the settings of the identification by the names of `settings.IDENTIFICATION`: `valve_friction
-    identify BAG` gives the numbers that the snapshot gives. A bag of this folder that is
-    `replaced` goes once the new one is whole.
+    The bag is written in a hidden folder next to its place and then renamed, so that nobody reads
+    an incomplete bag. The folder is created if missing; if the name is taken, a number is appended.
+    Rejected samples are only counted, in the metadata. The bag includes a valve file with the
+    settings of the identification by the names of `settings.IDENTIFICATION`, so that
+    `valve_friction identify BAG` gives the same numbers as the snapshot. The bag `replaced` in this
+    folder is removed once the new bag is complete.
 
-    Raises RefusalError if there is nothing to write, and OSError if it cannot be written; then
-    nothing is left behind.
+    Raises RefusalError if there is nothing to write, and OSError if writing fails; then nothing is
+    left behind.
     """
     stamps = np.concatenate((snapshot.pressure.stamps, snapshot.position.stamps))
     if stamps.size == 0:
