@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Sub-command `call`: a service of a running identifier, without the command `ros2`."""
+"""Sub-command `call`: call a service of a running identifier without the command `ros2`."""
 
 import argparse
 import math
@@ -22,11 +22,11 @@ from valve_friction_ros.identification import RefusalError
 
 REFUSALS = (RefusalError,)
 _DISCOVERY = 5.0
-"""Time for which an identifier is looked for, s. Chosen: nodes of a network meet in 1 to 3 s."""
+"""Time to search for an identifier, s. Chosen: nodes on a network find each other in 1 to 3 s."""
 
 
 def run(options: argparse.Namespace) -> int:
-    """Call the service, and print its answer."""
+    """Call the service and print its answer."""
     if not 0 < options.timeout < math.inf:
         raise ValueError(f"--timeout must be above zero, got {options.timeout:g}")
     if options.fail_on and options.service != "identify":

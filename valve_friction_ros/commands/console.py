@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Consoles that results are printed on."""
+"""Consoles for printing results."""
 
 import errno
 import os
@@ -16,18 +16,18 @@ import sys
 from rich.console import Console
 
 _PRINTED_WIDTH = 120
-"""Columns of what goes into a file or a pipe, which has no width of its own."""
+"""Width of output to a file or a pipe, columns."""
 
 
 class OutputConsole(Console):
-    """A console for which a closed output is an error; rich would end the process in silence."""
+    """A console that raises an error for a closed output; rich would silently end the process."""
 
     def on_broken_pipe(self) -> None:
-        """Raise the error again."""
+        """Reraise the error."""
         raise BrokenPipeError(errno.EPIPE, os.strerror(errno.EPIPE))
 
 
 def plain_console() -> Console:
-    """Return a console that prints text as it is, as wide as the terminal if there is one."""
+    """Return a console that prints plain text, as wide as the terminal if there is one."""
     width = None if sys.stdout.isatty() else _PRINTED_WIDTH
     return OutputConsole(width=width, highlight=False, markup=False)

@@ -57,7 +57,7 @@ def run(options: argparse.Namespace) -> int:
     server.require_free(access.host, shown.port)
     plant = Plant(shown.silence)
     history = KeptValves(place, plant)
-    history.valve("")  # refuses what is no history
+    history.valve("")  # refuses a file that is not a history
     visitors = server.guarded(access, _log)
     operator = GuardedOperator(HistoryOperator(history), visitors, _log)
     context = DashboardContext(

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Sub-command `dashboard-account`: a line of the file of accounts, with the hash of a password."""
+"""Sub-command `dashboard-account`: make a line of the accounts file, with a hashed password."""
 
 import argparse
 import getpass
@@ -29,7 +29,7 @@ def _password() -> str:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Ask, and print the line."""
+    """Ask for the password and print the line."""
     account = Account(options.name, Role(options.role), HashedPassword.unknown())
     print(Account(account.name, account.role, HashedPassword.of(_password())))
     return ExitCode.DONE

@@ -77,7 +77,7 @@ def _answers(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Ask, and write the file."""
+    """Ask the questions and write the file."""
     output: Path | None = options.output
     if output is not None and output.exists() and not options.replace:
         raise ValueError(f"{output}: it exists already: give another name, or --replace")

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Sub-command `history`: list, export and draw what the identifiers have kept."""
+"""Sub-command `history`: list, export and plot the history stored by the identifiers."""
 
 import argparse
 import json
@@ -61,7 +61,7 @@ _HOUR = 3600e9
 
 
 def _usage_as_json(usage: ValveUsage) -> dict[str, Any] | None:
-    """Return the usage as a mapping, with its times as text; None where nothing was counted."""
+    """Return the usage as a mapping, with times as text; None without usage."""
     if not usage.days and not usage.renewal:
         return None
     shown = usage.to_dict()
@@ -77,7 +77,7 @@ def service_lines(
     alarms: Sequence[AlarmRecording] = (),
     response: ResponseSummary | None = None,
 ) -> list[str]:
-    """Return what stands below the list of a valve: its usage, its answers, its latest alarm."""
+    """Return the lines below the list of a valve: usage, responses and latest alarm."""
     lines = []
     if usage.days:
         since = f"since {utc_day(usage.renewal)} (packing renewed)" if usage.renewal else "in all"
@@ -118,9 +118,9 @@ def _words(usage: Usage) -> str:
 def _print_usage_table(
     valves: Sequence[tuple[KeptValve, ValveUsage]], is_chosen: bool = False
 ) -> None:
-    """Print a table of days a valve, and the sums and the pace below it.
+    """Print a table of days per valve, followed by sums and pace.
 
-    Of chosen days the sum names the first and the last.
+    For chosen days the sum names the first and the last day.
     """
     console = plain_console()
     for valve, usage in valves:
@@ -166,7 +166,7 @@ def _print_usage_table(
 def _write_usage(path: Path, valves: Sequence[tuple[KeptValve, ValveUsage]]) -> None:
     """Write a row for each day of each valve, oldest first.
 
-    Raises OSError if it cannot be written; it names `path`, and no part of the table stays.
+    Raises OSError, which names `path`, if writing fails; then no part of the table is left.
     """
     rows = [_usage_row(valve, one) for valve, usage in valves for one in usage.days]
     header = list(_usage_row(KeptValve("", ""), UsedDay(0, 0, Usage())))
@@ -193,13 +193,13 @@ def _usage_row(valve: KeptValve, one: UsedDay) -> dict[str, object]:
 
 
 def time_text(time: float, timespec: str = "milliseconds") -> str:
-    """Write a time in ns since 1970 by ISO 8601, in UTC."""
+    """Format a time in ns since 1970 in ISO 8601 and UTC."""
     when = utc(time)
     return when.isoformat(timespec=timespec).replace("+00:00", "Z")
 
 
 def _trend_as_json(trend: Trend | None) -> dict[str, Any] | None:
-    """Return the trend; the numbers only where the drift is significant."""
+    """Return the trend as a mapping; with numbers only if the drift is significant."""
     if trend is None:
         return None
     is_sure, crossing = trend.is_significant, trend.crossing
@@ -226,7 +226,7 @@ def _trend_as_json(trend: Trend | None) -> dict[str, Any] | None:
 
 
 def _shown(entry: HistoryEntry | KeptBaseline) -> dict[str, Any]:
-    """Return an entry, or a baseline, as a mapping, with its times as text."""
+    """Return an entry or a baseline as a mapping, with times as text."""
     shown = entry.to_dict()
     for name in {"time", "begin", "end", "since"} & {*shown}:
         shown[name] = None if shown[name] is None else time_text(shown[name])
@@ -234,7 +234,7 @@ def _shown(entry: HistoryEntry | KeptBaseline) -> dict[str, Any]:
 
 
 def _as_json(histories: Sequence[ValveHistory]) -> dict[str, Any]:
-    """Build the object that JSON shows: valves, each with what was kept of it."""
+    """Build the JSON object: the valves, each with its history."""
     return {
         "valves": [
             {
@@ -282,12 +282,12 @@ def _row(entry: HistoryEntry) -> dict[str, object]:
 
 
 def _write_csv(path: Path, histories: Sequence[ValveHistory]) -> None:
-    """Write a row for each identification, oldest first; a cell without a value is empty.
+    """Write a row for each identification, oldest first; missing values become empty cells.
 
     Raises
     ------
     OSError
-        If it cannot be written; it names `path`, and no part of the table stays.
+        If writing fails; it names `path`, and no part of the table is left.
     """
     entries = sorted(
         (entry for history in histories for entry in history.entries), key=lambda one: one.time
@@ -299,17 +299,17 @@ def _write_csv(path: Path, histories: Sequence[ValveHistory]) -> None:
 
 
 def _told(entry: HistoryEntry) -> str:
-    """Return the reason of a refusal, or the verdict without its figures."""
+    """Return the reason of a refusal, or the diagnosis without figures."""
     found = entry.diagnosis
     if found.statement.code is Code.HELD_IN_TEST:
         return headline(found.statement)
     if found.statement.code is Code.QUOTED and found.state is not FrictionState.UNKNOWN:
-        return entry.refusal or member_words(found.state, "state")  # of a former version
+        return entry.refusal or member_words(found.state, "state")  # from a former version
     return entry.refusal or headline(found.statement)
 
 
 def _cells(row: HistoryEntry | KeptBaseline) -> tuple[str, ...]:
-    """Return what the table shows of an identification or a baseline, after its time."""
+    """Return the table cells of an identification or a baseline after its time."""
     if isinstance(row, KeptBaseline):
         level = "" if row.level is None else row.level.name
         change = f"{row.by}: {row.in_force or 'none'}; previous: {row.replaced or 'none'}"
@@ -328,7 +328,7 @@ def _cells(row: HistoryEntry | KeptBaseline) -> tuple[str, ...]:
 
 
 def _print_table(histories: Sequence[ValveHistory]) -> None:
-    """Print a table a valve, with its baselines, and the trend below it."""
+    """Print a table per valve with its baselines, followed by the trend."""
     console = plain_console()
     for history in histories:
         table = _valve_table(
@@ -422,7 +422,7 @@ def _span(options: argparse.Namespace) -> tuple[int, int]:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print what was kept of the chosen valves, and write the files asked for."""
+    """Print the history of the chosen valves, and write the requested files."""
     require_outputs(options.csv, picture=options.plot)
     if options.usage:
         return _print_usages(options)
@@ -444,7 +444,7 @@ def run(options: argparse.Namespace) -> int:
             print(json.dumps(_as_json(histories), ensure_ascii=False, allow_nan=False))
         else:
             _print_table(histories)
-    finally:  # a closed output costs no file, and a full disk no list
+    finally:  # a closed output must not prevent the files, nor a full disk the list
         if options.csv is not None:
             _write_csv(options.csv, histories)
         if figure is not None:

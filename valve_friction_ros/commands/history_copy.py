@@ -27,7 +27,7 @@ def _print_table(parts: tuple[CopiedPart, ...]) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Copy, and print what was copied, table by table."""
+    """Copy the history, and print the result table by table."""
     valves = History(options.source).valves()
     names = [one.name for one in chosen_valves(valves, options.valve, "--valve")]
     parts = copied(options.source, options.target, names)

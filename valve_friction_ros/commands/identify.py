@@ -61,10 +61,10 @@ def as_json(
     diagnosis: Diagnosis | None = None,
     findings: Sequence[Finding] = (),
 ) -> dict[str, Any]:
-    """Build the object that JSON shows of a result.
+    """Build the JSON object of a result.
 
-    `notes` join its warnings; `diagnosis` is there when there is one, and with it the `findings`
-    beside the friction.
+    `notes` are added to its warnings. If there is a `diagnosis`, the object includes it and the
+    further `findings`.
     """
     shown = result.to_dict()
     shown["warnings"] = [*notes, *shown["warnings"]]
@@ -80,7 +80,7 @@ def print_table(
     diagnosis: Diagnosis | None = None,
     findings: Sequence[Finding] = (),
 ) -> None:
-    """Print a result for people; `notes` join its warnings, `diagnosis` and `findings` end it."""
+    """Print a result for people, followed by `notes`, `diagnosis` and `findings`."""
     print(result.summary())
     for note in notes:
         print(f"note: {printable(note)}")
@@ -108,7 +108,7 @@ def baseline_from(options: argparse.Namespace) -> Baseline | None:
 
 
 def _require_report(options: argparse.Namespace) -> None:
-    """Refuse a report that cannot be written; the ValueError names the file and the cause."""
+    """Raise ValueError, with file and cause, if the report cannot be written."""
     if options.report is not None:
         from valve_friction_ros.reports import require_report_file  # noqa: PLC0415 - slow to import
 
@@ -116,7 +116,7 @@ def _require_report(options: argparse.Namespace) -> None:
 
 
 def _dated(path: Path, zone: str) -> str:
-    """Return when a file was last changed, in words; empty where it has no such time."""
+    """Return the time of the last change of a file, in words; empty if it is not a file."""
     if not path.is_file():
         return ""
     changed = datetime.fromtimestamp(path.stat().st_mtime, timezone.utc)
@@ -127,7 +127,7 @@ REFUSALS = (RefusalError,)
 
 
 class _Answer(NamedTuple):
-    """A valve of the file, its result or refusal, its diagnosis and findings if asked for."""
+    """A valve of the file, its result or refusal, and its diagnosis and findings if requested."""
 
     recorded: RecordedValve
     outcome: Result | RefusalError
@@ -136,7 +136,7 @@ class _Answer(NamedTuple):
 
     @property
     def levels(self) -> tuple[Level, ...]:
-        """Levels of all that is known of the valve's health."""
+        """Levels of the diagnosis and the findings of the valve."""
         own = () if self.diagnosis is None else (self.diagnosis.level,)
         return (*own, *(one.level for one in self.findings))
 
@@ -164,9 +164,9 @@ def _identified(
 def _of_healthy(
     options: argparse.Namespace, settings: MonitorSettings, reading: ReadingOptions
 ) -> tuple[Baseline, Recording]:
-    """Return the frictions of the healthy valve, and its record.
+    """Return the baseline of the healthy valve, and its record.
 
-    Raises RefusalError, which names its file, where it cannot be a baseline.
+    Raises RefusalError, which names the file, if the record cannot give a baseline.
     """
     whole = replace(reading, stretch=Stretch(), beside=())
     recorded = read_one(options.baseline_recording, settings.valve, whole)
@@ -188,7 +188,7 @@ def _write_files(
     limits: FrictionLimits,
     zone: str,
 ) -> None:
-    """Write what was asked for, with times in a zone; the OSError of a failure names the file."""
+    """Write the requested files, with times in a zone; raises OSError, which names the file."""
     if options.plot is not None:
         from valve_friction_ros import figures  # noqa: PLC0415 - slow to import
 
@@ -211,7 +211,7 @@ def _write_files(
 
 
 def _print_json(results: Sequence[_Answer]) -> None:
-    """Print the object of one valve; of several, an object of them by name."""
+    """Print the object of a single valve, or an object with several valves by name."""
     answers = {
         recorded.name: {"error": str(outcome)}
         if isinstance(outcome, RefusalError)
@@ -234,7 +234,7 @@ def _print_tables(results: Sequence[_Answer]) -> None:
 
 
 def _print(results: Sequence[_Answer], command: str, in_json: bool) -> int:
-    """Print what was found and what was refused; return the exit code."""
+    """Print results and refusals; return the exit code."""
     refusals = [result.outcome for result in results if isinstance(result.outcome, RefusalError)]
     if in_json and (len(results) > 1 or not refusals):
         _print_json(results)
@@ -248,7 +248,7 @@ def _print(results: Sequence[_Answer], command: str, in_json: bool) -> int:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Identify the valves of the file, print what was found, and write the files asked for."""
+    """Identify the valves of the file, print the results, and write the requested files."""
     description, reading = described(options.file, options.valve, options)
     valve = description.valve
     settings = MonitorSettings(
@@ -284,7 +284,7 @@ def run(options: argparse.Namespace) -> int:
         results.append(answer)
     try:
         code = _print(results, options.command, options.json)
-    finally:  # a closed output costs no picture, and a full disk no numbers
+    finally:  # a closed output must not prevent the pictures, nor a full disk the numbers
         for each, outcome, _, _ in results:
             if isinstance(outcome, Result):
                 zone = reading.columns.time_zone

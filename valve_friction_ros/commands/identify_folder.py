@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Sub-command `identify-folder`: identify all recordings of a folder, on all cores."""
+"""Sub-command `identify-folder`: identify all recordings in a folder, on all cores."""
 
 import argparse
 import contextlib
@@ -86,9 +86,9 @@ _VALVE_FILE = "valve.yaml"
 
 @dataclass(frozen=True)
 class Plan:
-    """What is to be done with a recording: the job, or why it cannot be done.
+    """Plan for a recording: the job, or why it cannot be done.
 
-    `content` and `settings` are fingerprints of its files and of its options.
+    `content` and `settings` are fingerprints of the files and the options.
     """
 
     name: str
@@ -98,7 +98,7 @@ class Plan:
 
 
 def _valve_file(found: FoundRecording, common: Path | None) -> Path | None:
-    """Choose the description that is nearest to a recording."""
+    """Choose the valve file closest to a recording."""
     beside = found.path.parent
     places = [beside / f"{found.stem}.{_VALVE_FILE}", beside / _VALVE_FILE]
     if found.path.is_dir():
@@ -113,9 +113,9 @@ def make_plan(
     baselines: Baselines,
     reports: Path | None,
 ) -> Iterator[Plan]:
-    """Plan each recording, in the order of their names; `reports` is the folder of the reports.
+    """Plan each recording, in order of name; `reports` is the folder of the reports.
 
-    A table with several valves of the plant is as many recordings.
+    A table with several valves of the plant becomes one recording per valve.
     """
     kept_baseline = cache(partial(baseline_kept, options.history))
 
@@ -125,7 +125,7 @@ def make_plan(
             return described(file, file, options)
 
     def valves(found: FoundRecording) -> Iterator[tuple[str, str, ValveFile, ReadingOptions]]:
-        """Yield label, tag, description and options of each valve of a recording."""
+        """Yield label, tag, description and options of each valve in a recording."""
         own = _valve_file(found, None if plant else options.valve)
         if own is not None:
             yield "", "", *described_by(own)
@@ -175,7 +175,7 @@ def make_plan(
 
 
 def _has_reports(entry: RecordingRows, plan: Plan) -> bool:
-    """Return whether the reports of an entry are there, if they are wanted."""
+    """Return whether the reports of an entry exist or are not requested."""
     if not isinstance(plan.job, Job) or plan.job.reports is None:
         return True
     beside = plan.job.reports.parent
@@ -186,7 +186,7 @@ def _has_reports(entry: RecordingRows, plan: Plan) -> bool:
 
 
 def _filed(plans: Mapping[str, Plan], options: argparse.Namespace) -> set[tuple[str, str]] | None:
-    """Return tag and time of what the history holds; None without a history."""
+    """Return tag and time of each result in the history; None without a history."""
     if options.history is None:
         return None
     tags = {plan.job.options.tag for plan in plans.values() if isinstance(plan.job, Job)}
@@ -197,7 +197,7 @@ def _filed(plans: Mapping[str, Plan], options: argparse.Namespace) -> set[tuple[
 
 
 def _is_filed(entry: RecordingRows, filed: set[tuple[str, str]] | None) -> bool:
-    """Return whether all results of an entry that have a tag and a date are in the history."""
+    """Return whether the history has all results of an entry that have a tag and a date."""
     return filed is None or all(
         row["error"] or not row["began"] or (str(row["valve"]), str(row["began"])) in filed
         for row in entry.rows
@@ -207,12 +207,12 @@ def _is_filed(entry: RecordingRows, filed: set[tuple[str, str]] | None) -> bool:
 def forget_stale(
     results: ResultsFile, plans: Mapping[str, Plan], options: argparse.Namespace
 ) -> tuple[list[Plan], int]:
-    """Drop the rows that do not hold any more; return what is left, and how many were dropped.
+    """Drop outdated rows; return the plans left to do, and how many were dropped.
 
-    With ``redo`` good rows of other options may go; with ``retry_failed`` refused recordings are
-    tried again, and so are those whose reports are missing.
+    With ``redo``, good rows made with other options may be dropped. With ``retry_failed``, refused
+    recordings are retried. Recordings with missing reports are always retried.
 
-    Raises ValueError if good rows were made with other options and may not go.
+    Raises ValueError if good rows were made with other options and must not be dropped.
     """
     done, others = set(), 0
     filed = _filed(plans, options)
@@ -240,14 +240,14 @@ Rows = list[Mapping[str, Cell]]
 """The cells of all valves of a recording."""
 
 ShareOut = Callable[[Iterable[Job], Callable[[], bool]], Iterator[tuple[Job, Rows | DeadWorker]]]
-"""Identifies recordings until it is to stop: yields each with its rows as it finishes."""
+"""Identifies recordings until told to stop, and yields each with its rows when finished."""
 
 
 @contextlib.contextmanager
 def workers(options: argparse.Namespace) -> Iterator[ShareOut]:
-    """Have those at hand that identify.
+    """Provide the workers that identify.
 
-    Raises ValueError if a cluster was asked for that is not there, or cannot do the work.
+    Raises ValueError if a requested cluster is missing or cannot do the work.
     """
     if options.scheduler is None:
         processes = usable_cores() if options.jobs is None else options.jobs
@@ -262,7 +262,7 @@ def workers(options: argparse.Namespace) -> Iterator[ShareOut]:
 def finished(
     plans: Sequence[Plan], share_out: ShareOut, stop: StopSignals
 ) -> Iterator[tuple[Plan, Rows]]:
-    """Yield each recording with its rows as it finishes; their reports are written."""
+    """Yield each recording with its rows when finished, with its reports written."""
     by_job: dict[str, Plan] = {}
     possible: list[Job] = []
     for plan in plans:
@@ -282,11 +282,11 @@ def finished(
 
 _SHOWN_REASONS = _SHOWN_ALARMS = _SHOWN_SKIPPED = 10
 _BAD = ("bad", "watch")
-"""What a first survey says of valves that need attention."""
+"""Verdicts of a first survey on valves that need attention."""
 
 
 def print_tally(counted: Tally) -> None:
-    """Print how many valves were identified or refused, and why."""
+    """Print the numbers of identified and refused valves, with the reasons."""
     console = OutputConsole(highlight=False, markup=False)
     table = Table("Coulomb friction", "valves", box=None, header_style="bold")
     table.columns[1].justify = "right"
@@ -301,7 +301,7 @@ def print_tally(counted: Tally) -> None:
 
 
 def print_alarms(rows: Iterable[Mapping[str, Cell]]) -> None:
-    """Print the valves that need attention, the first of them first, and what to do."""
+    """Print the valves that need attention, most urgent first, and what to do."""
     console = OutputConsole(highlight=False, markup=False)
     alarms = [row for row in ranked(rows) if reaches(row, Level.WARN) or row.get("survey") in _BAD]
     for row in alarms[:_SHOWN_ALARMS]:
@@ -328,7 +328,7 @@ def _require_own_file(options: argparse.Namespace) -> None:
 
 
 def _require_sense(options: argparse.Namespace) -> None:
-    """Refuse at once what would be refused of every recording."""
+    """Refuse at once options that every recording would refuse."""
     if options.jobs is not None and options.scheduler is not None:
         raise ValueError(
             "--jobs applies to this machine only: with --scheduler the cluster uses its own workers"
@@ -357,7 +357,7 @@ def _require_sense(options: argparse.Namespace) -> None:
 
 
 def _baselines(options: argparse.Namespace, names: Sequence[str]) -> Baselines:
-    """Read the baselines, and say how many of the recordings have one."""
+    """Read the baselines, and print how many of the recordings have one."""
     if options.baselines is None:
         return Baselines({})
     baselines = read_baselines(options.baselines)
@@ -397,9 +397,9 @@ def _planned(options: argparse.Namespace) -> dict[str, Plan]:
 def _identify(
     plans: Sequence[Plan], results: ResultsFile, share_out: ShareOut, stop: StopSignals
 ) -> list[Filing]:
-    """Identify the recordings, write their rows, and show the progress; return what is filed.
+    """Identify the recordings, write their rows and show the progress; return what to file.
 
-    A reason of refusals is shown once; the tally counts them.
+    Each reason for refusals is shown once; the tally gives their number.
     """
     filings: list[Filing] = []
     shown: set[str] = set()
@@ -415,7 +415,7 @@ def _identify(
     ) as progress:
         task = progress.add_task("", total=len(plans))
         for plan, rows in finished(plans, share_out, stop):
-            # By these a later run knows what was done.
+            # A later run recognizes finished recordings by these keys.
             keys = {"recording": plan.name, "content": plan.content, "settings": plan.settings}
             results.append([{**row, **keys, "valves": len(rows)} for row in rows])
             progress.advance(task)
@@ -430,7 +430,7 @@ def _identify(
 
 
 def _file(filings: Sequence[Filing], results: ResultsFile, options: argparse.Namespace) -> None:
-    """File results in the history, and compare each with the baseline that is in force there."""
+    """File results in the history, and compare each with the baseline in force there."""
     filed = file_results(options.history, filings, options.first_is_baseline)
     changed = {recording for recording, _ in filed.cells}
     stale = [entry for entry in results.entries() if entry.recording in changed]
@@ -447,7 +447,7 @@ def _file(filings: Sequence[Filing], results: ResultsFile, options: argparse.Nam
 
 
 def run(options: argparse.Namespace) -> int:
-    """Identify what is left to do, and print a tally."""
+    """Identify the remaining recordings, and print a tally."""
     _require_sense(options)
     with workers(options) as share_out:
         return _run(options, _planned(options), share_out)

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Sub-command `inspect`: show what would be read of a table, and how."""
+"""Sub-command `inspect`: show what would be read from a table, and how."""
 
 import argparse
 import json
@@ -37,16 +37,16 @@ from valve_friction_ros.streams import utc_second
 
 REFUSALS = (RefusalError,)
 _DATED = 946_684_800_000_000_000
-"""Time, ns since 1970, from which a stamp is a date: the year 2000."""
+"""Time, ns since 1970, from which a stamp is taken for a date: the year 2000."""
 _GAP = 10
-"""Sampling periods above which a pause is a gap."""
+"""Number of sampling periods beyond which a pause is a gap."""
 _BARS = "▁▂▃▄▅▆▇█"
 _PARTS = 60
-"""Most parts of the time in the picture of a signal."""
+"""Largest number of intervals in the sketch of a signal."""
 
 
 def _inspected(valve: str, read: ReadSignal) -> dict[str, Any]:
-    """Describe a signal as it was read: times in s, values in its unit, begin in ns since 1970."""
+    """Describe a signal as read: times in s, values in its unit, start in ns since 1970."""
     steps = np.diff(read.stamps) / 1e9
     period = float(np.median(steps)) if steps.size else np.nan
     return {
@@ -87,7 +87,7 @@ def _cells(one: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def _course(read: ReadSignal) -> NDArray[np.float64]:
-    """Return means of the values over equal parts of the time; nan where there is none."""
+    """Return means of the values over equal intervals of time; nan for an empty interval."""
     parts = min(_PARTS, read.stamps.size)
     course = np.full(parts, np.nan)
     if parts:
@@ -100,7 +100,7 @@ def _course(read: ReadSignal) -> NDArray[np.float64]:
 
 
 def _picture(read: ReadSignal) -> str:
-    """Return the course of the values in one line of text."""
+    """Return a sketch of the signal in one line of text."""
     course = _course(read)
     known = np.isfinite(course)
     if not known.any():
@@ -139,7 +139,7 @@ def _print(layout: Layout, reads: list[ReadSignal], signals: list[dict[str, Any]
 
 
 def _draw(options: argparse.Namespace, path: Path) -> None:
-    """Draw the recording, in SI units where a valve file gives the travel."""
+    """Plot the recording in SI units, with the travel from a valve file."""
     from valve_friction_ros import figures  # noqa: PLC0415 - slow to import
     from valve_friction_ros.figures.record_figures import record_figure  # noqa: PLC0415
 
@@ -150,7 +150,7 @@ def _draw(options: argparse.Namespace, path: Path) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print what would be read; what is open is a line on stderr, and exit code 2."""
+    """Print what would be read; open questions give a line on stderr and exit code 2."""
     description = valve_of(options)
     reading = reading_options(options, description.columns if description else None)
     with reading_progress():

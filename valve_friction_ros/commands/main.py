@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The command `valve_friction`: it finds the sub-command, and reports how it ended."""
+"""The command `valve_friction`: it runs the sub-command and reports errors."""
 
 import argparse
 import difflib
@@ -48,24 +48,24 @@ SUB_COMMANDS = {
     "reproduce-paper": "run the paper's programme and write a report",
     "demo": "tighten the packing of a monitored simulated valve",
 }
-"""The line in ``--help`` by sub-command; ``identify-folder`` is the module `identify_folder`."""
+"""Line in ``--help`` of each sub-command; ``identify-folder`` is the module `identify_folder`."""
 
 
 class SubCommand(Protocol):
-    """The module of a sub-command; it is imported only when its arguments have been read."""
+    """The module of a sub-command, imported only after its arguments have been parsed."""
 
     REFUSALS: tuple[type[Exception], ...]
-    """Errors of the user's request that `run` raises beside ValueError and OSError."""
+    """Errors of the user's request that `run` raises besides ValueError and OSError."""
 
     def run(self, options: argparse.Namespace) -> int:
-        """Run the sub-command that `arguments` name; return the exit code.
+        """Run the sub-command with parsed `options`; return the exit code.
 
-        What went wrong stands on one line of stderr.
+        An error is one line on stderr.
         """
 
 
 def _chosen(arguments: Sequence[str]) -> tuple[str, list[str]]:
-    """Return the sub-command and its arguments; end the process where there is none."""
+    """Return the sub-command and its arguments; without a sub-command end the process."""
     listed = "\n".join(f"  {name:<17} {text}" for name, text in SUB_COMMANDS.items())
     parser = OneLineParser(
         prog=PROGRAM,
@@ -106,9 +106,9 @@ def _run(name: str, arguments: Sequence[str]) -> int:
 
 
 def run(arguments: Sequence[str]) -> int:
-    """Run the sub-command that `arguments` name; return the exit code.
+    """Run the sub-command named by `arguments`; return the exit code.
 
-    What went wrong stands on one line of stderr.
+    An error is one line on stderr.
     """
     name = ""
     try:
@@ -117,7 +117,7 @@ def run(arguments: Sequence[str]) -> int:
             return _run(name, others)
         finally:
             flush_output()
-    except BrokenPipeError:  # whoever read the output has what they wanted, as `head` does
+    except BrokenPipeError:  # the reader has enough output, such as `head`
         return ExitCode.OUTPUT_CLOSED
     except OSError as error:
         complain(name, error)
@@ -125,22 +125,22 @@ def run(arguments: Sequence[str]) -> int:
 
 
 def main() -> int:
-    """Run as a process, which Ctrl-C ends with one line, too."""
+    """Run as a process; Ctrl-C also ends it with one line."""
     for name in ("stdout", "stderr"):
-        if getattr(sys, name) is None:  # closed by whoever started the process
+        if getattr(sys, name) is None:  # closed by the parent process
             setattr(sys, name, Path(os.devnull).open("w"))  # noqa: SIM115
-    if sys.stderr.isatty():  # somebody may wonder why nothing happens
+    if sys.stderr.isatty():  # a person may wonder why nothing happens
         logging.basicConfig(format=f"{PROGRAM}: %(message)s")
         logging.getLogger("valve_friction_ros.model.compiled").setLevel(logging.INFO)
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, end_at_once)
     try:
         return run(sys.argv[1:])
-    except BaseException:  # numpy makes an ImportError of a KeyboardInterrupt while it is imported
+    except BaseException:  # numpy turns a KeyboardInterrupt during its import into an ImportError
         if not has_been_interrupted():
             raise
         signal.signal(signal.SIGINT, signal.SIG_IGN)
         complain(" ".join(sys.argv[1:2]), "interrupted")
         return ExitCode.INTERRUPTED
-    finally:  # nothing is left but the end of the process
+    finally:  # only the end of the process is left
         signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Sub-command `plan-test`: the stroke test that tells the friction of a valve best, as a file."""
+"""Sub-command `plan-test`: plan the stroke test that best determines the friction of a valve."""
 
 import argparse
 import json
@@ -62,13 +62,13 @@ _WATCHED = (
     "-r pressure_set_point:=/YOUR/CONVERTER/COMMAND"
 )
 _ROUND = 10.0
-"""Pa to which limits for the player are rounded outwards."""
+"""Step to which limits for the player are rounded outwards, Pa."""
 
 
 def write_test(path: Path, plan: StrokePlan) -> None:
-    """Write the corners of the pressure, time_s and pressure_pa, linear between them.
+    """Write the corners of the piecewise linear pressure as time_s and pressure_pa.
 
-    Raises OSError, which names `path`; no part of the file stays.
+    Raises OSError, which names `path`, if writing fails; then no part of the file is left.
     """
     corners = zip(plan.test.times, plan.test.pressures, strict=True)
     rows = ["time_s,pressure_pa", *(f"{time:.6f},{pressure:.2f}" for time, pressure in corners)]
@@ -76,9 +76,9 @@ def write_test(path: Path, plan: StrokePlan) -> None:
 
 
 def player(plan: StrokePlan, path: Path, on_bench: bool = False) -> dict[str, Any]:
-    """Return the parameters of `pressure_source` that play the file and hold its limits.
+    """Return the parameters of `pressure_source` that play the file within its limits.
 
-    The converter of a valve has a lag of its own; on the simulated bench the player has it.
+    The converter of a real valve has its own lag; on the simulated bench the player adds the lag.
     """
     return {
         "excitation": "file",
@@ -111,7 +111,7 @@ def _forecast_json(name: str, one: Forecast, travel: float) -> dict[str, Any]:
 
 
 def as_json(plan: StrokePlan, path: Path) -> dict[str, Any]:
-    """Build the object that JSON shows; SI units."""
+    """Build the JSON object in SI units."""
     pattern = plan.test.pattern
     return {
         "file": str(path),
@@ -153,7 +153,7 @@ def _cell(one: Forecast, name: str) -> str:
 
 
 def print_plan(plan: StrokePlan, path: Path) -> None:
-    """Print what to expect, what to watch and how to play it."""
+    """Print what to expect, what to watch and how to play the test."""
     test, travel = plan.test, plan.valve.travel
     console = plain_console()
     speeds = " and ".join(f"{100 * one:.0f} %" for one in test.pattern.speeds)
@@ -214,7 +214,7 @@ def print_plan(plan: StrokePlan, path: Path) -> None:
 
 
 def _watched(plan: StrokePlan, path: Path) -> dict[str, Any]:
-    """Return the parameters of the node that watches the test."""
+    """Return the parameters of the node that monitors the test."""
     given, travel = player(plan, path), plan.valve.travel
     stems = [step.stem for step in set_points(plan, None)]
     lowest, highest = min(low for low, _ in stems), max(high for _, high in stems)
@@ -230,7 +230,7 @@ def _parameters(values: dict[str, Any]) -> str:
 
 
 def _units(options: argparse.Namespace) -> tuple[ShownUnit, ShownUnit]:
-    """Return the units of pressure and position in what is written for people."""
+    """Return the units of pressure and position in output for people."""
     sizes = PRESSURE[options.pressure_unit], LENGTH[options.position_unit]
     pressure, position = (size.multiplier / size.divisor for size in sizes)
     return (
@@ -243,7 +243,7 @@ REFUSALS = (RefusalError, HistoryError)
 
 
 def _planned(options: argparse.Namespace) -> StrokePlan:
-    """Read the files, and search with a bar on a terminal."""
+    """Read the files, and search for the test, with a progress bar on a terminal."""
     described = read_valve_file(options.valve, options.valve_name)
     frictions = frictions_from(options, described)
     given = {one.name: vars(options).get(one.name, one.default) for one in fields(Limits)}
@@ -275,7 +275,7 @@ def _planned(options: argparse.Namespace) -> StrokePlan:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Plan, write the files, and print what to expect."""
+    """Plan the test, write the files, and print what to expect."""
     files: list[Path] = [*filter(None, (options.output, options.table, options.form))]
     for path in files:
         if path.exists() and not options.replace:

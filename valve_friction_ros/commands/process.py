@@ -9,8 +9,8 @@
 
 """A sub-command as a process: exit code, one line of error, Ctrl-C and SIGTERM.
 
-Ctrl-C while a sub-command runs is an exception, which is not lost where others would lose it;
-SIGTERM can do the same. A process that a script starts by ``&`` has Ctrl-C ignored, never SIGTERM.
+Ctrl-C during a sub-command raises an exception that is never swallowed; SIGTERM can do the same. A
+process that a script starts with ``&`` ignores Ctrl-C, but never SIGTERM.
 """
 
 import argparse
@@ -48,14 +48,14 @@ class ExitCode(IntEnum):
 
 
 class OneLineParser(argparse.ArgumentParser):
-    """A parser that reports an error on one line; the usage is behind ``--help``."""
+    """A parser that reports an error on one line and shows the usage only for ``--help``."""
 
     def error(self, message: str) -> NoReturn:
         """Print the error and end with exit code 2."""
         self.exit(ExitCode.REFUSED, f"{self.prog}: {message}; see --help\n")
 
     def _print_message(self, message: str, file: Any = None) -> None:
-        """Print the help or an error; argparse would ignore that the help cannot be written."""
+        """Print the help or an error; argparse would ignore a failure to write the help."""
         if file is None or file is sys.stderr:
             super()._print_message(message, file)
         else:
@@ -63,13 +63,13 @@ class OneLineParser(argparse.ArgumentParser):
 
 
 def silence(stream: TextIO) -> None:
-    """Discard what `stream` still holds, which Python would try to write again at its end."""
+    """Discard the buffer of `stream`, which Python would try to write again at exit."""
     with contextlib.suppress(OSError), Path(os.devnull).open("wb") as nowhere:
         os.dup2(nowhere.fileno(), stream.fileno())
 
 
 def flush_output() -> None:
-    """Write what was printed; raises OSError where that fails, once."""
+    """Flush standard output; raises OSError once if this fails."""
     try:
         sys.stdout.flush()
     except OSError:
@@ -83,7 +83,7 @@ _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 def _text(error: Exception | str) -> str:
     if not isinstance(error, OSError) or not error.strerror:
         return str(error)
-    # Functions that write files name them; those that print do not.
+    # Functions that write files name the file; those that print do not.
     place = error.filename or ("standard output" if error.errno in _FULL else "")
     return f"{place}: {error.strerror}" if place else error.strerror
 
@@ -97,18 +97,18 @@ def complain(command: str, error: Exception | str) -> None:
     try:
         lines = _text(error).splitlines()
         print(f"{speaker}:", *map(printable, lines), file=sys.stderr)
-    except OSError:  # a full device, or a closed pipe: there is nowhere else to say it
+    except OSError:  # a full device or a closed pipe: there is nowhere else to report it
         silence(sys.stderr)
 
 
 _REPEAT = 0.02
 """Time until a lost Ctrl-C is repeated, s: callbacks are shorter."""
 _came: list[int] = []
-"""Numbers of the signals that have come."""
+"""Numbers of the signals received."""
 
 
 def has_been_interrupted() -> bool:
-    """Return whether Ctrl-C has come, or SIGTERM in its place."""
+    """Return whether Ctrl-C, or SIGTERM in its place, has been received."""
     return bool(_came)
 
 
@@ -117,7 +117,7 @@ def _repeat() -> None:
 
 
 def _repeat_if_importing() -> None:
-    """Repeat a signal that a library has caught while it was imported: it is imported still."""
+    """Repeat a signal swallowed by a library during its import, while the import continues."""
     frames = sys._current_frames()  # noqa: SLF001 - documented, for debuggers
     frame = frames.get(threading.main_thread().ident or 0)
     while frame is not None:
@@ -134,7 +134,7 @@ def _interrupt(number: int, frame: FrameType | None) -> None:
 
 
 def _interrupt_again(unraisable: "sys.UnraisableHookArgs") -> None:
-    """Repeat a signal that Python ignores, since it came within a callback."""
+    """Repeat a signal that Python has ignored because it came during a callback."""
     if _came and issubclass(unraisable.exc_type, KeyboardInterrupt):
         _repeat()
     else:
@@ -143,7 +143,7 @@ def _interrupt_again(unraisable: "sys.UnraisableHookArgs") -> None:
 
 @contextmanager
 def interrupt_raises() -> Iterator[None]:
-    """Let Ctrl-C raise KeyboardInterrupt, where it would end the process at once."""
+    """Let Ctrl-C raise KeyboardInterrupt instead of ending the process at once."""
     if signal.getsignal(signal.SIGINT) is end_at_once:
         signal.signal(signal.SIGINT, _interrupt)
         sys.unraisablehook = _interrupt_again
@@ -151,9 +151,9 @@ def interrupt_raises() -> Iterator[None]:
 
 
 def requests_raise() -> None:
-    """Let SIGTERM raise KeyboardInterrupt from now on, also where Ctrl-C is ignored.
+    """Let SIGTERM raise KeyboardInterrupt from now on, even if Ctrl-C is ignored.
 
-    So does the end of the terminal (SIGHUP), unless ``nohup`` has the process outlive it.
+    The end of the terminal (SIGHUP) does the same, unless the process runs under ``nohup``.
     """
     signal.signal(signal.SIGTERM, _interrupt)
     if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
@@ -162,7 +162,7 @@ def requests_raise() -> None:
 
 
 class StopSignals:
-    """While it is entered, Ctrl-C and SIGTERM are noted and do nothing else."""
+    """Context in which Ctrl-C and SIGTERM are only recorded."""
 
     def __init__(self) -> None:
         self.received: int | None = None
@@ -172,12 +172,12 @@ class StopSignals:
         self.received = number
 
     def wanted(self) -> bool:
-        """Return whether one of them has come."""
+        """Return whether a signal has been received."""
         return self.received is not None
 
     @property
     def exit_code(self) -> int:
-        """Exit code of a process that one of them ended: 130 after Ctrl-C, 143 after SIGTERM."""
+        """Exit code of a process ended by the signal: 130 for Ctrl-C, 143 for SIGTERM."""
         return 128 + (self.received or 0)
 
     def __enter__(self) -> "StopSignals":

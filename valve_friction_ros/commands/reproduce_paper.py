@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Sub-command `reproduce-paper`: the paper's programme, an example beside the package."""
+"""Sub-command `reproduce-paper`: run the programme of the paper, an example with the package."""
 
 import argparse
 import importlib
@@ -20,7 +20,7 @@ REFUSALS = (RefusalError,)
 
 
 def _examples() -> Path:
-    """Find the folder of the examples, in the sources or where they are installed."""
+    """Find the folder of the examples, in the sources or in the installation."""
     package = Path(__file__).resolve().parents[1]
     for above in package.parents:
         for folder in (above / "examples", above / "share" / package.name / "examples"):
@@ -33,7 +33,7 @@ def _examples() -> Path:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run the programme, and write the report."""
+    """Run the programme and write the report."""
     folder = str(_examples())
     if folder not in sys.path:
         sys.path.append(folder)

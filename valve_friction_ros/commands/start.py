@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Entry point of the command `valve_friction`, light enough to be interrupted at once."""
+"""Entry point of the command `valve_friction`, which can be interrupted at once."""
 
 import importlib
 import os
@@ -19,7 +19,7 @@ _INTERRUPTED = 128 + signal.SIGINT
 
 
 def end_at_once(*_: int | FrameType | None) -> None:
-    """End the process with one line: nothing has begun that would have to be cleaned up."""
+    """End the process with one line: there is nothing to clean up yet."""
     words = " ".join(["valve_friction", *sys.argv[1:2]])
     try:
         os.write(2, f"{words}: interrupted\n".encode())
@@ -28,11 +28,11 @@ def end_at_once(*_: int | FrameType | None) -> None:
 
 
 def main() -> int:
-    """Run the command; Ctrl-C while it is still being imported ends it at once."""
-    # An exception in the midst of an import may be lost there.
+    """Run the command; Ctrl-C during the import ends the process at once."""
+    # An exception raised during an import may be swallowed there.
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, end_at_once)
-    # A second thread costs more than it gives with matrices as small as these.
+    # For such small matrices a second thread costs more than it gains.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     code: int = importlib.import_module("valve_friction_ros.commands.main").main()
     return code

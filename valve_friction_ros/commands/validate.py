@@ -33,7 +33,7 @@ REFUSALS = (RefusalError,)
 
 
 def _poor(validation: Validation, least: float) -> str:
-    """Return that the fit is poor, and the remedy; empty if it is not."""
+    """Return a message on a poor fit with the remedy; empty if the fit is good."""
     if validation.fit >= least:
         return ""
     return (
@@ -56,7 +56,7 @@ def _print(validation: Validation, valve: Valve, notes: Sequence[str], poor: str
 
 
 def run(options: argparse.Namespace) -> int:
-    """Validate the model, print how well it describes the recording, and draw it."""
+    """Validate the model, print how well it fits the recording, and plot both."""
     description, reading = described(options.file, options.valve, options)
     valve = description.valve
     estimate = read_estimate(options.estimate)
@@ -92,7 +92,7 @@ def run(options: argparse.Namespace) -> int:
             print(json.dumps(shown, ensure_ascii=False, allow_nan=False))
         else:
             _print(validation, valve, notes, poor)
-    finally:  # a closed output costs no picture, and a full disk no numbers
+    finally:  # a closed output must not prevent the picture, nor a full disk the numbers
         if options.plot is not None:
             figures.save_picture(figures.validation_figure(validation, valve), options.plot)
     return ExitCode.ALARM if least is not None and validation.fit < least else ExitCode.DONE

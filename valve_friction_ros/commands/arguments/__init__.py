@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Arguments that sub-commands share, and what they stand for."""
+"""Arguments shared by sub-commands, and the objects built from them."""
 
 import argparse
 import math
@@ -20,18 +20,18 @@ _OPTION = re.compile(r"^ *(--[a-z-]+)(?: (\S+)|): ", re.MULTILINE)
 
 
 def add_options(parser: argparse._ActionsContainer, text: str, **more: Mapping[str, Any]) -> None:
-    """Declare options as their help shows them.
+    """Declare options in the form of their help text.
 
     Parameters
     ----------
     parser : ArgumentParser, or a group of one
-        What takes them.
+        The parser that takes the options.
     text : str
-        Each option on lines of its own, as ``--plot FILE.png: draw it``. Without a word for what it
-        takes it is a flag. It takes a path where that word is FILE, DIR or FOLDER, or has an
-        ending, and otherwise a text, unless `more` says more.
+        Each option starts a new line, as ``--plot FILE.png: draw it``. An option without a
+        placeholder is a flag. It takes a path if the placeholder is FILE, DIR or FOLDER or has a
+        file name extension. Otherwise it takes text, unless `more` gives another type.
     **more
-        Further keywords of `add_argument` by the name of the option, as ``jobs={"type": int}``.
+        Further keywords of `add_argument` by option, such as ``jobs={"type": int}``.
     """
     _, *parts = _OPTION.split(text)
     for name, takes, words in zip(parts[::3], parts[1::3], parts[2::3], strict=True):
@@ -44,7 +44,7 @@ def add_options(parser: argparse._ActionsContainer, text: str, **more: Mapping[s
 
 
 def percent(text: str, least: float = -math.inf, words: str = ", such as 90") -> float:
-    """Read a percentage of at most 100, and at least `least` times 100; return the share."""
+    """Parse a percentage between `least` times 100 and 100; return the share."""
     try:
         share = float(text.rstrip(" %")) / 100
     except ValueError:
@@ -55,7 +55,7 @@ def percent(text: str, least: float = -math.inf, words: str = ", such as 90") ->
 
 
 def require_outputs(*files: Path | None, picture: Path | None = None) -> None:
-    """Refuse files that cannot be written, before the work begins; None is no file."""
+    """Refuse files that cannot be written, before the work starts; None means no file."""
     for path in files:
         if path is not None and not path.parent.is_dir():
             raise ValueError(f"{path}: there is no folder {path.parent}")

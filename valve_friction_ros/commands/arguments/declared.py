@@ -7,10 +7,10 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""What each sub-command takes, and what its help says around it.
+"""Arguments and help text of each sub-command.
 
-Nothing slow is imported here, so that a help text is there at once; what runs a sub-command is
-imported when its arguments have been read.
+Nothing slow is imported here, so that help appears at once. The module that runs a sub-command is
+imported after its arguments have been parsed.
 """
 
 import argparse
@@ -268,11 +268,11 @@ def _call(parser: argparse.ArgumentParser) -> None:
 
 EARLIEST = datetime(1970, 1, 1, tzinfo=timezone.utc)
 LATEST = datetime(2262, 1, 1, tzinfo=timezone.utc)
-"""Nanoseconds since 1970 of a later year may not fit a signed 64-bit integer."""
+"""Latest accepted time: later times in ns since 1970 may not fit a signed 64-bit integer."""
 
 
 def _time(text: str) -> datetime:
-    """Read a date, or a date and a time, in UTC unless it says otherwise."""
+    """Parse a date with or without a time, in UTC unless a zone is given."""
     try:
         time = datetime.fromisoformat(text.replace("Z", "+00:00"))
     except ValueError:
@@ -286,7 +286,7 @@ def _time(text: str) -> datetime:
 
 
 def _until(text: str) -> datetime:
-    """Read the end of a period; a date includes its whole day."""
+    """Parse the end of a period; a date includes its whole day."""
     is_date = "T" not in text and " " not in text
     return min(_time(text) + timedelta(days=is_date), LATEST)
 
@@ -474,4 +474,4 @@ DECLARATIONS: Mapping[str, Callable[[argparse.ArgumentParser], None]] = MappingP
         "demo": _demo,
     }
 )
-"""Function that declares the arguments of each sub-command."""
+"""Functions that declare the arguments, by sub-command."""

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Arguments on what is identified, or was: settings, ``--fail-on``, a history, an estimate."""
+"""Arguments on identifications: settings, ``--fail-on``, a history, an estimate."""
 
 import argparse
 import json
@@ -33,11 +33,11 @@ if TYPE_CHECKING:
     from valve_friction_ros.records.valve_file import ValveFile
 
 _NUMBERS = {int: "N", float: "SHARE"}
-"""What the help calls pure numbers."""
+"""Placeholders of pure numbers in the help."""
 
 
 def add_identification_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the settings that are options, and the known parameters."""
+    """Declare the settings that have options, and the known parameters."""
     for one in (*IDENTIFICATION, *SURVEY):
         if not one.option:
             continue
@@ -87,17 +87,16 @@ def _fixed(entries: Sequence[str], known: Mapping[str, float]) -> dict[str, floa
 
 
 def method_name(options: argparse.Namespace, described: Mapping[str, Any]) -> str:
-    """Return the method that was asked for, or else the valve file's."""
+    """Return the requested method, else that of the valve file."""
     return str(options.method or described.get("method", DEFAULT_METHOD))
 
 
 def identification_settings(
     options: argparse.Namespace, described: "ValveFile"
 ) -> IdentificationSettings:
-    """Build the settings from the parsed arguments, and from what the valve file names.
+    """Build the settings from the parsed arguments and the valve file.
 
-    An option goes before the settings of the valve file. Raises ValueError if they do not go
-    together.
+    An option overrides the valve file. Raises ValueError if the settings are incompatible.
     """
     options_given = {one.name: getattr(options, one.field) for one in IDENTIFICATION if one.option}
     known = {f"fixed.{name}": value for name, value in _fixed(options.fix, described.known).items()}
@@ -112,9 +111,9 @@ def identification_settings(
 
 
 def survey_limits(options: argparse.Namespace, described: "ValveFile") -> "FrictionLimits":
-    """Build the limits from the parsed arguments, and from what the valve file names.
+    """Build the limits from the parsed arguments and the valve file.
 
-    An option goes before the valve file. Raises ValueError if they are out of order.
+    An option overrides the valve file. Raises ValueError if the limits are out of order.
     """
     from valve_friction_ros.health import FrictionLimits, SurveyLimits  # noqa: PLC0415 - slow
 
@@ -126,7 +125,7 @@ def survey_limits(options: argparse.Namespace, described: "ValveFile") -> "Frict
 
 
 def add_fail_on(parser: argparse.ArgumentParser) -> None:
-    """Declare the level from which a diagnosis fails the command."""
+    """Declare the option for the level from which a diagnosis fails the command."""
     parser.add_argument(
         "--fail-on",
         choices=("warn", "error"),
@@ -136,7 +135,7 @@ def add_fail_on(parser: argparse.ArgumentParser) -> None:
 
 
 def has_failed(options: argparse.Namespace, found: "Iterable[Level]") -> bool:
-    """Return whether ``--fail-on`` is given, and one of the levels reaches it."""
+    """Return whether ``--fail-on`` is given and one of the levels reaches it."""
     if options.fail_on is None:
         return False
     from valve_friction_ros.health import Level  # noqa: PLC0415 - slow to import
@@ -145,11 +144,11 @@ def has_failed(options: argparse.Namespace, found: "Iterable[Level]") -> bool:
 
 
 PLACE = "FILE.sqlite|URL"
-"""How the help calls a history."""
+"""Placeholder of a history in the help."""
 
 
 def history_place(text: str) -> Path | HistoryServer:
-    """Read a path, or the address of a server."""
+    """Parse a path, or the address of a server."""
     if not is_url(text):
         return Path(text)
     try:
@@ -166,9 +165,9 @@ def _is_called(valve: "KeptValve", name: str) -> bool:
 def chosen_valves(
     valves: "Sequence[KeptValve]", names: Sequence[str] | None, option: str
 ) -> "tuple[KeptValve, ...]":
-    """Return the valves of these names: tag, namespace or identifier; all without names.
+    """Return the valves with these names (tag, namespace or identifier); by default all.
 
-    Raises ValueError, which names `option` and the valves, if there is no such valve.
+    Raises ValueError, with `option` and the known valves, if a valve is unknown.
     """
     if names is None:
         return tuple(valves)
@@ -180,7 +179,7 @@ def chosen_valves(
 
 
 _LARGEST = 10_000_000
-"""Most bytes of an estimate. Chosen: `identify --json` writes some ten thousand."""
+"""Largest file of an estimate, bytes. Chosen: `identify --json` writes some ten thousand."""
 
 
 def _value(path: Path, name: str, entry: Any) -> float:
@@ -202,7 +201,7 @@ def _value(path: Path, name: str, entry: Any) -> float:
 def read_estimate(path: Path) -> dict[str, float]:
     """Read the values by name from the JSON of `valve_friction identify`; nan: not identifiable.
 
-    Raises ValueError, one line with the file and what it lacks.
+    Raises ValueError, one line with the file and the problem.
     """
     try:
         with path.open("rb") as stream:
@@ -216,7 +215,7 @@ def read_estimate(path: Path) -> dict[str, float]:
         raise ValueError(f"{path}: not JSON: {error}") from None
     except RecursionError:
         raise ValueError(f"{path}: not JSON: it is nested too deeply") from None
-    except ValueError as error:  # too large, as a whole or a number of thousands of digits
+    except ValueError as error:  # too large, as a file or as a number with thousands of digits
         raise ValueError(f"{path}: {error}") from None
     if isinstance(content, dict) and "valves" in content:
         raise ValueError(f"{path}: contains several valves: identify one of them with --valve-name")

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Arguments of `plan-test`: what is known of a valve, and what may be done to it."""
+"""Arguments of `plan-test`: known data of a valve, and limits of the test."""
 
 import argparse
 import math
@@ -40,7 +40,7 @@ _percent = partial(percent, least=0.0, words=" of the travel, such as 40")
 
 
 def add_planning_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare what is known, the limits, the sensors and the aim."""
+    """Declare the arguments on known data, limits, sensors and aim."""
     _add_known(parser)
     _add_limits(parser)
     _add_sensors(parser)
@@ -155,9 +155,9 @@ def _earlier(options: argparse.Namespace) -> Mapping[str, float]:
 
 
 def frictions_from(options: argparse.Namespace, described: "ValveFile") -> "FrictionRange":
-    """Return the valves to plan for.
+    """Return the range of friction to plan for.
 
-    Raises ValueError if the spring is unknown, or a number is impossible.
+    Raises ValueError if the spring is unknown or a number is impossible.
     """
     from valve_friction_ros.planning import (  # noqa: PLC0415 - slow to import
         known_friction,
@@ -201,7 +201,7 @@ def frictions_from(options: argparse.Namespace, described: "ValveFile") -> "Fric
 
 
 def planned_settings(options: argparse.Namespace, described: "ValveFile") -> IdentificationSettings:
-    """Return how the test will be identified, with timing and calibration of the valve file."""
+    """Return the settings of the identification, with timing and calibration of the valve file."""
     timing = options.timing_uncertainty
     if timing is None:
         timing = described.settings.get("timing_uncertainty")

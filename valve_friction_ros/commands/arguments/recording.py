@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Arguments of the commands that read a recording: the file, its valve, and what it leaves open."""
+"""Arguments of commands that read a recording: the file, its valve and its format."""
 
 import argparse
 import contextlib
@@ -30,11 +30,11 @@ if TYPE_CHECKING:
     from valve_friction_ros.records.valve_file import ValveFile
 
 _OWN_DESCRIPTION = "valve.yaml"
-"""The valve file in a bag, as ``~/save`` leaves it."""
+"""Name of the valve file that ``~/save`` writes into a bag."""
 
 
 def add_recording_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the file, ``--valve``, and the options of reading."""
+    """Declare the file, ``--valve``, and the reading options."""
     parser.add_argument(
         "file",
         type=Path,
@@ -62,7 +62,7 @@ def add_recording_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the options that say what a file leaves open."""
+    """Declare the options for information that a file lacks."""
     stretch = parser.add_argument_group("part of the recording")
     for name, default, help_text in (
         ("begin", -math.inf, "skip everything before S seconds after the first sample"),
@@ -90,7 +90,7 @@ def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def add_table_arguments(parser: argparse.ArgumentParser, text: str) -> None:
-    """Declare how a table is written."""
+    """Declare the options for the format of a table."""
     table = parser.add_argument_group("CSV, Excel, Parquet", text)
     for each in fields(Columns):
         option, text = f"--{each.name.replace('_', '-')}", each.metadata["help"]
@@ -108,7 +108,7 @@ def add_table_arguments(parser: argparse.ArgumentParser, text: str) -> None:
 
 
 def given_columns(arguments: argparse.Namespace) -> dict[str, Any]:
-    """Return what the parsed arguments say of a table."""
+    """Return the format of a table given by the parsed arguments."""
     options = {each.name: getattr(arguments, each.name) for each in fields(Columns)}
     return {name: value for name, value in options.items() if value is not None}
 
@@ -116,9 +116,9 @@ def given_columns(arguments: argparse.Namespace) -> dict[str, Any]:
 def reading_options(
     arguments: argparse.Namespace, columns: Columns | None = None
 ) -> "ReadingOptions":
-    """Build the options of reading from the parsed arguments, and from what the valve file says.
+    """Build the reading options from the parsed arguments and the valve file.
 
-    Raises ValueError if they do not go together.
+    Raises ValueError if they are incompatible.
     """
     from valve_friction_ros.records.recorded_valve import Stretch  # noqa: PLC0415
     from valve_friction_ros.records.recordings import ReadingOptions  # noqa: PLC0415 - slow
@@ -134,7 +134,7 @@ def reading_options(
 
 
 def valve_of(arguments: argparse.Namespace) -> "ValveFile | None":
-    """Read the valve file, if there is one, given or in the bag."""
+    """Read the given valve file, or that in the bag, if any."""
     from valve_friction_ros.records.valve_file import read_valve_file  # noqa: PLC0415 - slow
 
     path = arguments.valve or _own_description(arguments.file)
@@ -142,9 +142,9 @@ def valve_of(arguments: argparse.Namespace) -> "ValveFile | None":
 
 
 def save_columns(arguments: argparse.Namespace, reading: "ReadingOptions") -> None:
-    """Write the valve file with what was found of the table, if that was asked for.
+    """Write the recognized format of the table into the valve file, if requested.
 
-    Raises ValueError if it is a bag, or leaves something open; OSError if it cannot be written.
+    Raises ValueError if the recording is a bag or leaves a question open; OSError if writing fails.
     """
     if arguments.save_columns is None:
         return
@@ -165,7 +165,7 @@ def save_columns(arguments: argparse.Namespace, reading: "ReadingOptions") -> No
 
 @contextlib.contextmanager
 def reading_progress() -> "Iterator[None]":
-    """Show on a terminal how much of a large text was read."""
+    """Show on a terminal how much of a large text has been read."""
     from valve_friction_ros.records.table_rows import PROGRESS  # noqa: PLC0415 - slow to import
 
     if not sys.stderr.isatty():
@@ -194,11 +194,10 @@ def _own_description(recording: Path) -> Path | None:
 def described(
     recording: Path, valve_file: Path | None, arguments: argparse.Namespace
 ) -> "tuple[ValveFile, ReadingOptions]":
-    """Read the valve file of a recording, or that in a bag; a recorded force needs none.
+    """Return the valve file of a recording, given or in the bag, and the reading options.
 
-    Return the options of reading too.
-
-    Raises ValueError if the valve file cannot be read, or is needed and not given.
+    A recorded force needs no valve file. Raises ValueError if the valve file cannot be read, or is
+    required but not given.
     """
     from valve_friction_ros.model import Valve  # noqa: PLC0415 - slow to import
     from valve_friction_ros.records.files import on_disk  # noqa: PLC0415
@@ -221,9 +220,9 @@ def described(
 
 
 def require_one(recorded: "Sequence[RecordedValve]", purpose: str) -> None:
-    """Refuse several valves where `purpose` is for one.
+    """Refuse several valves if `purpose` takes only one.
 
-    The ValueError names the valves and the option that chooses one.
+    The ValueError names the valves and the option to choose one.
     """
     if len(recorded) > 1:
         names = ", ".join(each.name for each in recorded)
@@ -231,10 +230,9 @@ def require_one(recorded: "Sequence[RecordedValve]", purpose: str) -> None:
 
 
 def read_one(path: Path, valve: "Valve", reading: "ReadingOptions") -> "RecordedValve":
-    """Read the one valve that a file holds, or that was chosen.
+    """Read the only valve in a file, or the chosen valve.
 
-    Raises ValueError or RefusalError if it cannot be read: one line that names the file, the cause
-    and what to do.
+    Raises ValueError or RefusalError if it cannot be read: one line with file, cause and remedy.
     """
     from valve_friction_ros.records.recordings import read_recordings  # noqa: PLC0415 - slow
 

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The bench of the demo: its nodes as processes of their own, and a client that talks to them."""
+"""The bench of the demo: its nodes as separate processes, and a client for them."""
 
 import contextlib
 import os
@@ -41,11 +41,11 @@ _POLL = 0.05
 
 
 class BenchError(Exception):
-    """The bench did not do what it should; the message says what."""
+    """The bench failed; the message gives the cause."""
 
 
 class BenchClient(Node):
-    """Gathers in `buffer` what the bench in `namespace` publishes, as any third node would."""
+    """Collects in `buffer` the samples of the bench in `namespace`, as any other node could."""
 
     def __init__(self, namespace: str, buffer: RecordBuffer) -> None:
         super().__init__("demo", namespace=namespace)
@@ -56,7 +56,7 @@ class BenchClient(Node):
         self._status: DiagnosticStatus | None = None
         self._first_stamp: int | None = None
         self._last_stamp = 0
-        # Taken in blocks, as the nodes do: a callback a sample would take most of a processor.
+        # Taken in blocks, as in the nodes: a callback per sample would take most of a core.
         self._pressures = PolledSubscription(self, FluidPressure, "actuator_pressure", stream())
         self._stems = PolledSubscription(self, JointState, "stem_state", stream())
         self.create_subscription(DiagnosticArray, "/diagnostics", self._on_diagnostics, 10)
@@ -101,23 +101,23 @@ class BenchClient(Node):
 
     @property
     def identifier_hears(self) -> bool:
-        """Whether the latest diagnostic counts samples of both signals."""
+        """Whether the latest diagnostic shows samples of both signals."""
         shown = self.diagnostic_values
         return all(
             int(shown.get(f"buffered_{signal}", "0")) > 0 for signal in ("pressures", "positions")
         )
 
     def begin_record(self) -> None:
-        """Forget what was gathered and start anew."""
+        """Discard all samples and start a new record."""
         self._buffer.clear(said(Code.CLEARED_AS_RECORD_BEGINS))
         self._first_stamp = None
 
     def recording(self) -> Recording:
-        """Return what was gathered, on a uniform grid."""
+        """Return the collected samples on a uniform grid."""
         return self._buffer.snapshot().recording()
 
     def wait(self, done: Callable[[], bool], timeout: float, what: str) -> None:
-        """Spin until `done` is true; raises BenchError naming `what` after `timeout` seconds."""
+        """Spin until `done` is true; raises BenchError, which names `what`, after `timeout` s."""
         deadline = time.monotonic() + timeout
         while not done():
             if time.monotonic() > deadline:
@@ -139,7 +139,7 @@ class BenchClient(Node):
         return str(call.answer.message)
 
     def set_parameters(self, node: str, values: Mapping[str, float], timeout: float = 10.0) -> None:
-        """Set parameters of a node of the bench, all at once."""
+        """Set parameters of a node of the bench atomically."""
         target = f"{self.get_namespace()}/{node}"
         asked = set_parameters_request(self, target, values)
         try:
@@ -150,14 +150,14 @@ class BenchClient(Node):
             raise BenchError(f"{node} refused: {asked.answer.result.reason}")
 
     def close(self) -> None:
-        """Stop listening."""
+        """Shut down the executor and destroy the node."""
         self._executor.shutdown()
         self.destroy_node()
 
 
 _STOP_TIMEOUT = 5.0
 _DOMAINS = 100
-"""Domains 1 to 100: a larger number may collide with ports that the system gives away."""
+"""Largest domain: higher numbers may collide with ports that the system assigns."""
 _PROFILE = Path(__file__).with_name("fast_discovery.xml")
 
 
@@ -169,9 +169,9 @@ class NodeProcess(NamedTuple):
 
 
 def quick_discovery() -> dict[str, str]:
-    """Return the environment in which processes of this machine find each other quickly.
+    """Return environment variables for fast discovery between processes of this machine.
 
-    Nothing leaves the machine. What the user has set already stays.
+    Nothing leaves the machine. Variables set by the user are kept.
     """
     wanted = {
         "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
@@ -182,10 +182,10 @@ def quick_discovery() -> dict[str, str]:
 
 @contextlib.contextmanager
 def free_domain() -> Iterator[int]:
-    """Provide a ROS domain that the user has not set and no other demo of this machine uses.
+    """Provide a ROS domain that is not the user's and that no other demo on this machine uses.
 
-    A domain of a running bench would show its topics here, under the same names. An abstract
-    socket of the domain's number is held as long as the domain is in use.
+    In the domain of another running bench, its topics would appear here under the same names. An
+    abstract socket with the number of the domain is held as long as the domain is in use.
     """
     set_already = os.environ.get("ROS_DOMAIN_ID", "0")
     first = os.getpid() % _DOMAINS
@@ -234,10 +234,10 @@ def _stop(processes: Sequence[subprocess.Popen[bytes]]) -> None:
 def running_nodes(
     nodes: Sequence[NodeProcess], namespace: str
 ) -> Iterator[list[subprocess.Popen[bytes]]]:
-    """Run `nodes` in `namespace` as long as the context lasts; then stop them."""
+    """Run `nodes` in `namespace` as long as the context lasts, then stop them."""
     processes: list[subprocess.Popen[bytes]] = []
     try:
-        # A session of their own keeps the terminal's Ctrl-C from them: they are stopped here.
+        # Separate sessions shield the nodes from Ctrl-C in the terminal: they are stopped here.
         processes += [
             subprocess.Popen(_command(node, namespace), start_new_session=True) for node in nodes
         ]

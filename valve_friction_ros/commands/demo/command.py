@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Sub-command `demo`: the packing of a simulated valve is tightened, and the monitor notices."""
+"""Sub-command `demo`: tighten the packing of a simulated valve, and watch the monitor detect it."""
 
 import argparse
 import os
@@ -57,7 +57,7 @@ from valve_friction_ros.model import (
 from valve_friction_ros.streams import RecordBuffer
 
 WEIGHED_MASS = 1.6
-"""Mass that the identification is given, kg: noise hides it from a square wave."""
+"""Mass given to the identification, kg: with a square wave noise hides it."""
 
 TOLERANCES = {
     "mass": 0.10,
@@ -67,15 +67,15 @@ TOLERANCES = {
     "spring_constant": 0.002,
     "spring_preload": 0.002,
 }
-"""Relative errors that a published estimate may have, by parameter, with the noise of the demo.
+"""Tolerated relative errors of a published estimate with the noise of the demo, by parameter.
 
 The mass is given. A published F_s is read from single samples.
 """
 _INTERVALS = 3.0
-"""Half widths of its interval by which an identified value may be off."""
+"""Tolerated error of an identified value, in half widths of its interval."""
 _ANSWER_TIMEOUT = 120.0
 _NEWEST = 2.0
-"""Age, s, up to which a diagnosed estimate is the one just asked for."""
+"""Age, s, up to which a diagnosed estimate is the one just requested."""
 
 
 class Outcome(NamedTuple):
@@ -88,11 +88,11 @@ class Outcome(NamedTuple):
     case: Case
 
     def errors(self) -> dict[str, float]:
-        """Relative errors of the published estimate."""
+        """Return the relative errors of the published estimate."""
         return {name: self.published[name] / getattr(self.truth, name) - 1 for name in TOLERANCES}
 
     def missed(self) -> list[str]:
-        """Parameters whose published error exceeds the tolerance, or whose interval is untrue."""
+        """Return the parameters whose published error or interval is out of tolerance."""
         outside = {
             name for name, error in self.errors().items() if not abs(error) <= TOLERANCES[name]
         }
@@ -106,9 +106,9 @@ class Outcome(NamedTuple):
 
 
 def identified(client: BenchClient, label: str, truth: KarnoppParameters) -> Outcome:
-    """Identify the record on the running node and read the result from its topics.
+    """Identify the record on the running node, and read the result from its topics.
 
-    The picture is of the same record, identified here.
+    The picture shows the same record, identified in this process.
     """
     recording = client.recording()
     client.trigger("identify")
@@ -144,7 +144,7 @@ def _found(name: str, values: Mapping[str, str]) -> Parameter:
 
 
 def table_of(outcome: Outcome) -> Table:
-    """Put true, published and identified values side by side; what is off is red."""
+    """Show true, published and identified values side by side; values out of tolerance are red."""
     table = Table(title=outcome.label, title_justify="left", box=None, header_style="bold")
     table.add_column("parameter", no_wrap=True)
     table.add_column("unit", no_wrap=True)
@@ -177,7 +177,7 @@ _POSITION_BIAS = LOW_FRICTION.spring_preload / LOW_FRICTION.spring_constant
 _PRINTED_WIDTH = 100
 _START_TIMEOUT = 30.0
 _UNDER_WAY = 2.0
-"""Signal let pass after a change, s: samples still under way belong to the time before it."""
+"""Signal time skipped after a change, s: samples still in transit are from before the change."""
 _FRICTION = ("mass", "viscous_friction", "coulomb_friction", "static_friction")
 
 
@@ -208,7 +208,7 @@ def _nodes() -> list[NodeProcess]:
         "position_bias": _POSITION_BIAS,
         "fixed.mass": WEIGHED_MASS,
         "valve_tag": _NAMESPACE.upper().replace("_", "-"),
-        "history_file": "''",  # empty, as ROS arguments write it: a demo is no plant's history
+        "history_file": "''",  # empty: a demo must not enter the history of a plant
     }
     return [
         NodeProcess("identifier", monitored),
@@ -220,7 +220,7 @@ def _nodes() -> list[NodeProcess]:
 
 
 class _Story(NamedTuple):
-    """What the demo saw: both states of the packing, and the closing diagnostic."""
+    """Results of the demo: both states of the packing, and the final diagnostic."""
 
     outcomes: Sequence[Outcome]
     level: int | None
@@ -245,7 +245,7 @@ def _run(client: BenchClient, console: Console) -> _Story:
 
 
 def _report(story: _Story, output: Path, console: Console) -> int:
-    """Print and draw what was seen, compare it with the tolerances; return the exit code."""
+    """Print and plot the results, compare them with the tolerances; return the exit code."""
     for outcome in story.outcomes:
         console.print(table_of(outcome))
     level = "without a level" if story.level is None else Level(story.level).name
@@ -264,18 +264,18 @@ def _report(story: _Story, output: Path, console: Console) -> int:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run the bench, and report what was seen."""
+    """Run the bench and report the results."""
     console = OutputConsole(width=None if sys.stdout.isatty() else _PRINTED_WIDTH)
     if options.dashboard:
         require_dashboard()
     else:
         require_picture_file(options.output)
-    with console.status("preparing"):  # beside each other, several nodes would compile the same
+    with console.status("preparing"):  # otherwise each node would compile the same code
         compile_methods()
     os.environ.update(quick_discovery())
-    requests_raise()  # the nodes have sessions of their own, and would stay
+    requests_raise()  # the nodes have their own sessions, and would survive
     with free_domain() as domain, TemporaryDirectory(prefix="valve_friction_demo") as home:
-        os.environ |= {"ROS_DOMAIN_ID": str(domain), "ROS_HOME": home}  # a demo is no plant's
+        os.environ |= {"ROS_DOMAIN_ID": str(domain), "ROS_HOME": home}  # not of a plant
         if options.dashboard:
             return show_plant(console, Path(home))
         return _demonstrated(options, console)
@@ -283,7 +283,7 @@ def run(options: argparse.Namespace) -> int:
 
 def _demonstrated(options: argparse.Namespace, console: Console) -> int:
     with running_nodes(_nodes(), _NAMESPACE):
-        # Ctrl-C is Python's own: the handler of rclpy would end the context under the client.
+        # Python handles Ctrl-C: the handler of rclpy would end the context under the client.
         rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
         client = BenchClient(_NAMESPACE, RecordBuffer(BENCH_VALVE, 2 * _RECORD))
         try:

@@ -29,23 +29,23 @@ _PORT = 8080
 _RATE = 200.0
 _RECORD = 2 * SquareWave().period
 _REST = _RECORD
-"""Time between a change of the packings and their identification, s: a record is new by then."""
+"""Time between a change of the packings and the identification, s: the record is new by then."""
 _FRICTION = 300.0
 _START_TIMEOUT = 90.0
 _ANSWER_TIMEOUT = 120.0
 
 
 class PlantValve(NamedTuple):
-    """A valve of the plant, and what happens to its packing.
+    """A valve of the plant, and the change of its packing.
 
     Attributes
     ----------
     name : str
-        Its namespace.
+        Namespace of the valve.
     fate : str
-        What happens, in a word.
+        The change, in a word.
     growth, end : float
-        Factor of its friction from one identification to the next, and after all of them.
+        Factor of friction from one identification to the next, and after all of them.
     """
 
     name: str
@@ -54,7 +54,7 @@ class PlantValve(NamedTuple):
     end: float
 
     def friction(self, step: int) -> float:
-        """Return its Coulomb friction at an identification, N."""
+        """Return the Coulomb friction at an identification, N."""
         bound = max if self.growth < 1 else min
         return _FRICTION * bound(self.growth**step, self.end)
 
@@ -67,7 +67,7 @@ VALVES = (
 
 
 def require_dashboard() -> None:
-    """Raise BenchError where NiceGUI is not installed."""
+    """Raise BenchError if NiceGUI is not installed."""
     if importlib.util.find_spec("nicegui") is None:
         from valve_friction_ros.dashboard.context import INSTALL  # noqa: PLC0415 - rarely needed
 
@@ -77,7 +77,7 @@ def require_dashboard() -> None:
 
 
 def plant_nodes(valve: PlantValve, number: int, history: Path) -> list[NodeProcess]:
-    """Return the nodes of a valve: a slow sine, noise of 10 µm and 20 Pa, jitter of 1 ms."""
+    """Return the nodes of a valve: slow sine, noise of 10 µm and 20 Pa, jitter of 1 ms."""
     return [
         NodeProcess(
             "identifier",
@@ -116,7 +116,7 @@ def _packing(friction: float) -> dict[str, float]:
 
 
 def _tell(client: Caller, console: Console) -> None:
-    """Identify all valves again and again, each time with the packing of the next step."""
+    """Identify all valves repeatedly, each time with the packing of the next step."""
     step = 0
     while True:
         for valve in VALVES:
@@ -134,16 +134,16 @@ def _tell(client: Caller, console: Console) -> None:
 
 
 def _call(client: Caller, valve: PlantValve, service: str) -> str:
-    """Call a service of an identifier; return its answer, also one without success."""
+    """Call a service of an identifier; return its answer, even if it reports a failure."""
     answer = client.call(f"/{valve.name}/identifier", service, _ANSWER_TIMEOUT)
-    if answer is None:  # only where nobody wants it any more
+    if answer is None:  # only if it is no longer wanted
         raise KeyboardInterrupt
     level = "" if answer.level is None else f"{answer.level.name}: "
     return f"{level}{answer.message}"
 
 
 def _free_port() -> int:
-    """Return the usual port, or any other that is free."""
+    """Return the usual port, or another free port."""
     with socket.socket() as tried:
         for port in (_PORT, 0):
             with contextlib.suppress(OSError):
@@ -166,7 +166,7 @@ def _wait_for_page(process: subprocess.Popen[bytes], port: int) -> None:
 
 
 def show_plant(console: Console, home: Path) -> int:
-    """Run three valves and the dashboard until Ctrl-C or SIGTERM; their history is in a folder."""
+    """Run three valves and the dashboard until Ctrl-C or SIGTERM; `home` holds their history."""
     port = _free_port()
     history = home / "history.sqlite"
     with contextlib.ExitStack() as running, contextlib.suppress(KeyboardInterrupt):
