@@ -387,7 +387,7 @@ class _StrokePlayer:
     """Highest pressure that may be set [Pa]; required."""
     file_rate = Setting(1e12, (0.0, 1e12))
     """Largest rate of the pressure in the file [Pa/s]."""
-    pressure_margin = Setting(1e4, (0.0, 1e9))
+    pressure_margin = Setting(_Of("planning.played_test", "PRESSURE_MARGIN"), (0.0, 1e9))
     """Margin by which the measured pressure may exceed these two limits [Pa]."""
     position_minimum = Setting(0.0, (-10.0, 10.0))
     """Stem position below which the test returns to its start [m]."""

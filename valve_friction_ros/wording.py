@@ -699,7 +699,7 @@ _SENTENCES = {
     Code.CLEARED_AS_SETTINGS: "valve or window parameters were changed",
     Code.CLEARED_AS_RECORD_BEGINS: "a new record begins",
     Code.CLEARED_AS_STAMPS_GO_BACK: "time stamps go backwards: the buffer is cleared",
-    Code.STAMPS_WENT_BACK: "the time stamps of {signal} returned by {seconds:.3g} s",
+    Code.STAMPS_WENT_BACK: "the time stamps of {signal} jumped back by {seconds:.3g} s",
     Code.TIME_JUMPED: "ROS time jumped by {seconds:.3g} s",
     Code.TIME_JUMPS: "ROS time jumps",
     Code.SAMPLE_DAMAGED: "{signal} is damaged",

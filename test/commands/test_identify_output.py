@@ -32,6 +32,7 @@ from valve_friction_ros.identification import (
     published_estimate,
 )
 from valve_friction_ros.model import BENCH_VALVE, LOW_FRICTION, Recording, simulate
+from valve_friction_ros.wording import two_digits
 
 SETTINGS = IdentificationSettings(assumed_mass=1.6)  # of the valve file
 PNG = b"\x89PNG\r\n\x1a\n"
@@ -69,9 +70,12 @@ class TestTable:
                 assert f"{name} {entry['verdict']}: {entry['reason']}" in words
         misfit = result.misfit
         share = f"{100 * misfit.rms / BENCH_VALVE.travel:.2g} % of travel"
-        assert f"fit {100 * misfit.fit:.2f} %: the stem of the most probable model is" in words
-        assert f"{misfit.rms * 1e6:.3g} µm rms from the measured stem, {share}; " in words
-        assert f"; {misfit.systematic * 1e6:.3g} µm of this is not noise" in words
+        assert (
+            f"fit {100 * misfit.fit:.2f} %: the simulated stem deviates from the measured stem"
+            in words
+        )
+        assert f" by {two_digits(misfit.rms * 1e6)} µm rms, {share}, of which " in words
+        assert f", of which {two_digits(misfit.systematic * 1e6)} µm is more than noise" in words
         sweep = answer["evidence"]
         assert f"threshold δv {sweep['threshold']:.4g} m/s, {sweep['samples']} samples" in words
         assert "window 31 samples" in words

@@ -87,7 +87,7 @@ def test_the_text_says_that_nothing_moves_and_how_to_play_it(plan, tmp_path):
     words = " ".join(out.split())
     assert "Nothing has been moved." in words
     assert "put the loop in manual" in words
-    assert "between 40 and 60 % of the travel" in words
+    assert "% of the travel (40 to 60 % with the friction assumed)" in words
     assert "1.5 to 1.8 times as wide" in words
     assert "never the topic of the measured pressure" in words
     plays = [line for line in out.splitlines() if line.startswith("ros2 run")]

@@ -325,7 +325,7 @@ def test_a_life_of_an_alarm(live, history):
     refused = client.trigger("acknowledge")
     assert (refused.success, refused.message) == (
         False,
-        "who is empty: give your name",
+        "who is empty: state your name",
     )
     answer = ask(client, "acknowledge", text="repack on Monday")
     assert (answer.success, answer.message) == (True, "friction high: acknowledged")

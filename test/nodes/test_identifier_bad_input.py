@@ -186,7 +186,7 @@ def test_stamps_that_go_back_clear_the_buffer(client, signal):
     topic = {"pressure": "actuator_pressure", "stem": "stem_state"}[signal]
     reason = client.identify_all(0).message
     assert "no samples" in reason
-    assert f"the buffer was cleared: the time stamps of {topic} returned by 5.99 s" in reason
+    assert f"the buffer was cleared: the time stamps of {topic} jumped back by 5.99 s" in reason
     identifies_the_next_record(client)
 
 
@@ -200,7 +200,7 @@ def test_the_log_tells_a_clearing_right_after_a_bad_sample(live):
     client.wait_for_buffered(0)
     client.wait_until(
         lambda: (
-            "stamps of actuator_pressure returned by 0.01 s: the buffer was cleared"
+            "stamps of actuator_pressure jumped back by 0.01 s: the buffer was cleared"
             in process.errors
         ),
         "the warning",

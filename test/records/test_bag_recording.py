@@ -237,8 +237,8 @@ class TestBadSamples:
         np.testing.assert_array_equal(valve.recording().position, record.position[1001:])
         (note,) = valve.notes
         assert note == (
-            "the time stamps of actuator_pressure returned by 2 s: data recorded before that was "
-            "left out"
+            "the time stamps of actuator_pressure jumped back by 2 s: data recorded before that "
+            "was left out"
         )
 
     def test_undecodable(self, tmp_path):

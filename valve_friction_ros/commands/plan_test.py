@@ -185,13 +185,15 @@ def print_plan(plan: StrokePlan, path: Path) -> None:
     for remark in plan_remarks(plan):
         console.print(f"note: {remark}")
     low, high = plan.limits.lowest, plan.limits.highest
+    lowest, highest = set_points(plan, None)[0].stem
     console.print(
         "Nothing has been moved. Before: agree with operations, put the loop in manual, keep "
         f"people off the stem, and bring the pressure slowly to {test.pressures[0] / 1e3:.4g} kPa. "
-        f"Meanwhile: watch that the stem stays between {100 * low:g} and {100 * high:g} % of the "
-        "travel; if it does not, or the process moves too far, stop the player, which leaves the "
-        "pressure where it is, and restore it by hand. After: identify the record before the loop "
-        "goes back to automatic."
+        f"Meanwhile: watch that the stem stays between {100 * lowest:.0f} and {100 * highest:.0f} "
+        f"% of the travel ({100 * low:g} to {100 * high:g} % with the friction assumed). If it "
+        "does not, or the process moves too far, abort: stroke_player returns to the initial "
+        "pressure; after stopping pressure_source, restore it by hand. After: identify the record "
+        "before the loop goes back to automatic."
     )
     console.print(
         "Without ROS: --table writes the set points in %, mA and pressure for a control system, "

@@ -307,9 +307,9 @@ class AlarmRequest:
                 raise AlarmError(f"{name} must be one line of at most {longest} characters")
             object.__setattr__(self, name, given)
         if not self.who:
-            raise AlarmError("who is empty: give your name")
+            raise AlarmError("who is empty: state your name")
         if self.action is AlarmAction.COMMENT and not self.text:
-            raise AlarmError("text is empty: give the comment")
+            raise AlarmError("text is empty: write the comment")
         if (longest_time := _LONGEST.get(self.action)) is None:
             return
         if not 0 < self.duration * 1e9 <= longest_time:

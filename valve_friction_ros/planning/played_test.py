@@ -46,6 +46,10 @@ class Abort(Enum):
     SHUTDOWN = auto()
 
 
+PRESSURE_MARGIN = 1e4
+"""Distance, Pa, of the limits of the measured pressure from the set points, unless set. Chosen."""
+
+
 @dataclass(frozen=True)
 class PlayLimits:
     """Limits that end a test at once.

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from valve_friction_ros.model.valve import Valve
+from valve_friction_ros.planning.played_test import PRESSURE_MARGIN
 from valve_friction_ros.planning.search import StrokePlan
 from valve_friction_ros.planning.stroke_test import FrictionRange
 from valve_friction_ros.wording import two_digits
@@ -232,8 +233,8 @@ def form_of(
         "ABORT    and go back slowly to the signal before the test, if",
         f"         the stem is below {100 * low:.0f} % ({lowest} {of_stem}) or above "
         f"{100 * high:.0f} % ({highest} {of_stem}) of the travel,",
-        f"         the pressure is below {pressure.shown(band.low, 2)} or above "
-        f"{pressure.shown(band.high, 2)} {of_air},",
+        f"         the pressure is below {pressure.shown(band.low - PRESSURE_MARGIN, 2)} or above "
+        f"{pressure.shown(band.high + PRESSURE_MARGIN, 2)} {of_air},",
         f"         the stem has not moved after {_clock(_first_return(steps))} (min:s),",
         "         or the process moves further than ________________",
         "",

@@ -249,8 +249,8 @@ def pressure_band(valve: Valve, frictions: FrictionRange, limits: Limits) -> Pre
             f"the pressure limits leave no usable band: the stem needs {low / 1e3:.4g} to "
             f"{high / 1e3:.4g} kPa between {100 * limits.lowest:g} and {100 * limits.highest:g} % "
             f"of the travel, and {_lowest(valve, limits) / 1e3:.4g} kPa to "
-            f"{_highest(valve, limits)} may be set: widen the range of the pressure (the "
-            "atmosphere, pressure_reference, is its floor)"
+            f"{_highest(valve, limits)} may be set: widen the range of the pressure (it "
+            "cannot go below pressure_reference)"
         )
     _require_strokes(valve, frictions, limits, pressures, (low, high))
     return pressures

@@ -335,7 +335,9 @@ class OpenTable:
         if repeats:
             remedy = "export it with fractions of a second, or delete one of the rows"
         elif form.formats and not form.has_zone and not form.zone:
-            remedy += "; of clocks that were put back name the zone (--time-zone)"
+            remedy += (
+                "; if the clocks were put back during the record, state the time zone (--time-zone)"
+            )
         place = f"row {read.rows[sample]}, column {column!r}"
         return f"{self.path}: {place} {what} ({now} after {before}): {remedy}"
 

@@ -324,8 +324,8 @@ def published_words(result: Result) -> str:
     words = (
         "Published method: the regression of the paper, for comparison. It uses derivatives of "
         f"the smoothed position, and only {samples}. Noise, smoothing, lags and slow sliding bias "
-        f"it; it has no interval, and gives a number also where the record determines none. "
-        f"{_how_else(result)}Where the two differ, use the value."
+        f"it; it has no interval, and yields a number even where the record determines none. "
+        f"{_how_else(result)}Where the two differ, trust the column value."
     )
     outside = [one for one in beside if 0 < one.half_width < abs(one.published - one.value)]
     if not outside:
@@ -343,7 +343,8 @@ def _how_else(result: Result) -> str:
         samples = "over all samples"
         if "uncertainty_budget" in result.evidence:
             samples += (
-                " and at rest too, and counts with lags, noise and imperfections of the sensors"
+                ", including those at rest, and takes lags, noise and imperfections of the sensors "
+                "into account"
             )
         return f"The value fits the simulated stem to the measured one, {samples}. "
     if result.method in ("plant", "bench"):

@@ -185,10 +185,10 @@ def test_gross_is_a_tenth_of_the_movement_that_noise_does_not_explain(fit, syste
 
 
 def test_distance_of_the_stem_in_words():
-    assert stem_distance(28.6e-6, Valve(0.0445)) == "28.6 µm rms from the measured stem"
+    assert stem_distance(28.6e-6, Valve(0.0445)) == "29 µm rms"
     short = Valve(0.0445, travel=0.0286)
-    assert stem_distance(28.6e-6, short) == "28.6 µm rms from the measured stem, 0.1 % of travel"
-    assert stem_distance(0.12345, Valve(0.0445)) == "1.23e+05 µm rms from the measured stem"
+    assert stem_distance(28.6e-6, short) == "29 µm rms, 0.1 % of travel"
+    assert stem_distance(0.12345, Valve(0.0445)) == "123450 µm rms"
 
 
 @pytest.mark.parametrize(

@@ -353,7 +353,7 @@ def _by_strokes(
         side * value + left,
         np.full_like(forces, scatter),
         {SLIDING: sliding},
-        sliding_speed=stem.speed_over_distance(away_from_stops(stem.value, valve)) / distance,
+        sliding_speed=stem.mean_speed(away_from_stops(stem.value, valve), distance),
         stribeck_velocity=0.0,
         lag=0.0,
         inflation=1.0,

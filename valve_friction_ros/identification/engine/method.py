@@ -105,6 +105,7 @@ from valve_friction_ros.identification.units import SLIDING
 from valve_friction_ros.model.recording import Recording, StampedRecord, StampedSignal
 from valve_friction_ros.model.valve import KarnoppParameters, Valve
 from valve_friction_ros.signals import MeasuredRecord, as_sent_on_change, measured
+from valve_friction_ros.wording import two_digits
 
 _WINDOWS, _SHORTEST_WINDOW = 10, 3
 """Means of the position in which a record must show both directions, and fewest samples in each:
@@ -337,9 +338,9 @@ def _of_simulation(
         misfit=misfit,
         sliding_speed=_sliding_speed(fit, curves),
         findings=(
-            f"fit {100 * misfit.fit:.2f} %: the stem of the most probable model is "
-            f"{stem_distance(misfit.rms, valve)}; {misfit.systematic * 1e6:.3g} µm of this is not "
-            "noise",
+            f"fit {100 * misfit.fit:.2f} %: the simulated stem deviates from the measured stem by "
+            f"{stem_distance(misfit.rms, valve)}, of which "
+            f"{two_digits(misfit.systematic * 1e6)} µm is more than noise",
         ),
         warnings=found_imperfections(fit),
         imperfections=estimated(fits, found_sizes, prior.lag),
@@ -413,7 +414,9 @@ def _of_force_balance(
     best = next(one for one in curves if one.numbers[SLIDING].value == numbers[SLIDING].value)
     misfit = curve_misfit(best, numbers[SLIDING])
     reproduced = f"the force balance reproduces {100 * misfit.fit:.2f} % of the force"
-    beyond = f"; {misfit.words} of the residual is not noise" if misfit.systematic > 0.0 else ""
+    beyond = (
+        f"; {misfit.words} of the residual is more than noise" if misfit.systematic > 0.0 else ""
+    )
     return _Outcome(
         parameters=curve_verdicts(numbers, settings, best.stribeck_velocity, force_range),
         numbers=numbers,

@@ -80,7 +80,8 @@ def _stamp_remarks(name: str, signal: StampedSignal) -> list[str]:
     return remarks
 
 
-def _value_remarks(name: str, signal: StampedSignal) -> list[str]:
+def _value_remarks(name: str, signal: StampedSignal, size: float, unit: str) -> list[str]:
+    """Return remarks on the values of a signal, in a unit with its size in SI units."""
     changes = np.flatnonzero(np.diff(signal.value))
     remarks: list[str] = []
     if changes.size < 2:
@@ -96,7 +97,8 @@ def _value_remarks(name: str, signal: StampedSignal) -> list[str]:
         )
     if step > _COARSE * noise:
         remarks.append(
-            f"the resolution of {name} is coarse: its steps of {step:.2g} exceed the noise"
+            f"the resolution of {name} is coarse: its steps of {step / size:.3g} {unit} exceed the "
+            "noise"
         )
     return remarks
 
@@ -116,14 +118,17 @@ def _noise_remarks(name: str, signal: StampedSignal) -> list[str]:
 
 def sampling_remarks(record: StampedRecord) -> tuple[str, ...]:
     """Return a sentence for each way in which the samples differ from those of a good sensor."""
-    remarks, words = [], record.driven_by.words
-    for name, signal in ((f"the {words}", record.drive), ("the stem", record.position)):
-        remarks += _stamp_remarks(name, signal) + _value_remarks(name, signal)
+    remarks, drive = [], record.driven_by
+    for name, signal, size, unit in (
+        (f"the {drive.words}", record.drive, drive.size, drive.unit),
+        ("the stem", record.position, 1e-6, "µm"),
+    ):
+        remarks += _stamp_remarks(name, signal) + _value_remarks(name, signal, size, unit)
         remarks += _noise_remarks(name, without_repeats(signal))
     periods = record.drive.period, record.position.period
     if max(periods) > _RATES * min(periods):
         remarks.append(
-            f"the signals have different rates: {words} {1 / periods[0]:.3g} Hz, stem "
+            f"the signals have different rates: {drive.words} {1 / periods[0]:.3g} Hz, stem "
             f"{1 / periods[1]:.3g} Hz"
         )
     if max(periods) > _SLOW:

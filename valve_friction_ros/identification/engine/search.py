@@ -410,7 +410,7 @@ class _Search:
             found = [*self.followed(best, -1.0), *self.followed(best, 1.0)]
         nearest_to_none = min([best, *found], key=lambda one: abs(one.lag))
         if abs(nearest_to_none.lag) > 0.5 * _first_step(best) and self.may_go_on:
-            found.append(self.held(best, nearest_to_none.at, 0.0))
+            found.append(self.without_lag(best, nearest_to_none.at))
         is_possible = best.lag + _delay(best) < LARGEST_LAG
         if follows and is_possible and "viscous_friction" in best.names and self.may_go_on:
             found.append(self.behind_slow_sensor(best))
@@ -433,12 +433,25 @@ class _Search:
 
     def held(self, best: PosteriorFit, at: Coordinates, lag: float) -> PosteriorFit:
         """Fit at one lag, s, from the point to which the linear model of the best fit leads."""
+        start = self.along(best, at, lag)
+        return self.fit(start, best.names, _PROFILE_STEPS, self.exact, lag)
+
+    def without_lag(self, best: PosteriorFit, at: Coordinates) -> PosteriorFit:
+        """Fit without a lag, from the linear model or from viscous friction in place of the lag."""
+        delayed = at["viscous_friction"] + lag_of(at) * at["spring_constant"]
+        least = _LEAST_LEFT * at["viscous_friction"]
+        replaced = {**at, **dict.fromkeys(TIMING, 0.0), "viscous_friction": max(delayed, least)}
+        start = nearest(self.exact, [self.along(best, at, 0.0), replaced])[0]
+        return self.fit(start, best.names, _FEW_STEPS, self.exact, 0.0)
+
+    def along(self, best: PosteriorFit, at: Coordinates, lag: float) -> Coordinates:
+        """Return the point at a lag, s, to which the linear model of the best fit leads."""
         start = dict(at)
         for name, share in zip(best.names, best.along_lag.tolist(), strict=True):
             there = start[name] + share * (lag - lag_of(at))
             least = _LEAST_LEFT * abs(start[name]) if name in MAIN[:3] else -math.inf
             start[name] = max(there, least, BOUNDS.get(name, -math.inf))
-        return self.fit(start, best.names, _PROFILE_STEPS, self.exact, lag)
+        return start
 
     def behind_slow_sensor(self, best: PosteriorFit) -> PosteriorFit:
         """Fit a stem with hardly any viscous friction behind a slow sensor of its position."""

@@ -15,7 +15,7 @@ from valve_friction_ros.identification.engine.imperfections import IMPERFECTIONS
 from valve_friction_ros.identification.engine.intervals import ROUNDING, Budget
 from valve_friction_ros.identification.engine.posterior_fit import PosteriorFit
 from valve_friction_ros.identification.units import UNITS
-from valve_friction_ros.wording import percentage
+from valve_friction_ros.wording import percentage, two_digits
 
 _SURE = 3.0
 _LEAST_SLIP = 0.1
@@ -38,8 +38,8 @@ _LEAST = {
 """Least size of an imperfection that is worth a sentence, in its own unit."""
 
 _OTHERS = {
-    "start_position": "the initial stem position",
-    ROUNDING: "the force within one step of the converter",
+    "start_position": "initial stem position",
+    ROUNDING: "force within one step of the converter",
 }
 """Words for the sources of uncertainty that are not imperfections."""
 
@@ -56,7 +56,7 @@ def _deviation(fit: PosteriorFit, name: str) -> float:
 
 def _size(name: str, value: float) -> str:
     if name in TIMING:
-        return f"{1e3 * abs(value):.2g} ms"
+        return f"{two_digits(1e3 * abs(value))} ms"
     if name == "presliding":
         return f"{1e6 * value:.2g} µm"
     if name == "limit_velocity":
@@ -103,7 +103,7 @@ def main_doubt(budget: Budget, width: str) -> str:
     share = f"its interval is {width}"
     if not named:
         return f"{share}, due to noise and to motion that the model does not explain"
-    return f"{share}: the record does not determine {' and '.join(named[:3])}"
+    return f"{share}; not determined by the record: {', '.join(named[:3])}"
 
 
 def late_sensor(name: str, value: float) -> str:

@@ -162,16 +162,17 @@ class MeasuredSignal(NamedTuple):
         parts = [(self.time[part::2], self.value[part::2]) for part in (0, 1)]
         return [np.interp(grid, time, averaged_twice(value, length)) for time, value in parts]
 
-    def speed_over_distance(self, free: NDArray[np.bool_]) -> float:
-        """Return ∫|v|·|dx| where the stem is `free`, m²/s.
+    def mean_speed(self, free: NDArray[np.bool_], distance: float) -> float:
+        """Return the mean speed ∫|v|·|dx| / ∫|dx| where the stem is `free`, m/s.
 
         The speed of each move is measured over the shortest time in which the move surely exceeds
         the noise: a jump from sample to sample, a slow ramp over many samples. Pieces of the record
-        without such a move are joined in pairs until they have one.
+        without such a move are joined in pairs until they have one. The rest of the `distance` of
+        all strokes, m, is near their ends: it is taken to be half as fast.
         """
         free = free[1:] & free[:-1]
         raw, left, times = np.diff(self.value), np.diff(self.value) * free, np.diff(self.time)
-        range_, total = float(np.ptp(self.value)), 0.0
+        range_, covered, squares = float(np.ptp(self.value)), 0.0, 0.0
         white = noise = math.sqrt(2.0) * self.noise
         while raw.size > 1:
             # The difference of adjacent moves has three times the variance of a move's noise, which
@@ -180,11 +181,15 @@ class MeasuredSignal(NamedTuple):
             noise = max(white, min(unsteady / math.sqrt(3.0), math.sqrt(2.0) * noise))
             demanded = min(_SURE_MOVE * noise, _LARGEST_MOVE * range_)
             sure = np.abs(left) >= max(demanded, _OF_RANGE * range_, _TINY)
-            total += float(np.sum((left[sure] ** 2 - white**2) / times[sure]))
+            covered += float(np.sum(np.abs(left[sure])))
+            squares += float(np.sum((left[sure] ** 2 - white**2) / times[sure]))
             left, times = np.where(sure, 0.0, left), np.where(sure, 0.0, times)
             pairs = np.arange(0, raw.size, 2)
             raw, left, times = (np.add.reduceat(one, pairs) for one in (raw, left, times))
-        return max(total, 0.0)
+        if not squares > 0.0:
+            return 0.0
+        fast = squares / covered
+        return fast * (0.5 + 0.5 * min(covered / distance, 1.0))
 
 
 def force_and_stem(record: StampedRecord, valve: Valve) -> tuple[MeasuredSignal, MeasuredSignal]:
@@ -434,7 +439,7 @@ class Work(NamedTuple):
 
         whole = [np.interp(time, one.time, one.value) for one in (force, stem)]
         sampled = np.minimum(np.searchsorted(averages.time, stem.time), averages.time.size - 1)
-        speed = stem.speed_over_distance(averages.is_free[sampled]) / path.distance
+        speed = stem.mean_speed(averages.is_free[sampled], path.distance)
 
         def by(length: int) -> "Work":
             pressed, position = (averaged_twice(one, length) for one in whole)

@@ -41,6 +41,7 @@ from valve_friction_ros.identification.trust.verdict import (
     with_verdict,
 )
 from valve_friction_ros.identification.units import SLIDING, UNITS
+from valve_friction_ros.wording import two_digits
 
 USABLE = 0.1
 """Half width over value up to which a sliding friction is of use to maintenance.
@@ -49,8 +50,8 @@ Chosen: well below the 25 % of growth that raises the first alarm."""
 
 _DOUBTS = {
     Doubt.MISFIT: (
-        "no friction model here reproduces the motion exactly ({um:.2g} µm are not noise): the "
-        "sliding friction is reliable, its components are not"
+        "no friction model here reproduces the motion exactly ({um} µm of the deviation is more "
+        "than noise): the sliding friction is reliable, its components are not"
     ),
     Doubt.LAG: (
         "the best fit puts the signals {ms:.0f} ms apart, which is not plausible: something else "
@@ -139,8 +140,8 @@ def fit_verdicts(
     force_range = float(np.ptp(fit.model.record.force))
     if not misfit.describes:
         doubt = (
-            f"the Karnopp model does not describe this valve: {misfit.systematic * 1e6:.3g} µm of "
-            "the misfit is not noise"
+            "the Karnopp model does not describe this valve: "
+            f"{two_digits(misfit.systematic * 1e6)} µm of the misfit is more than noise"
         )
     top = _top_speed(fit)
     slow, split = _slow_doubt(top), _split_doubt(fits, misfit, profile)
@@ -188,7 +189,7 @@ def _split_doubt(fits: Sequence[PosteriorFit], misfit: Misfit, profile: Profile)
     doubt = doubt_of(fits, profile)
     if doubt is None:
         return ""
-    return _DOUBTS[doubt].format(um=1e6 * misfit.systematic, ms=1e3 * abs(fits[0].lag))
+    return _DOUBTS[doubt].format(um=two_digits(1e6 * misfit.systematic), ms=1e3 * abs(fits[0].lag))
 
 
 def _unseen(
@@ -274,6 +275,6 @@ def _slow_doubt(top: float) -> str:
     if top >= FALL_SPEED:
         return ""
     return (
-        f"valid up to {top * 1e3:.2g} mm/s, because the stem is rarely faster: friction may fall "
-        f"further up to {FALL_SPEED * 1e3:.2g} mm/s"
+        f"valid up to {top * 1e3:.2g} mm/s; the stem was rarely faster, and friction may still "
+        f"fall between there and {FALL_SPEED * 1e3:.2g} mm/s"
     )

@@ -13,7 +13,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from valve_friction_ros.wording import misfit_words, percentage
+from valve_friction_ros.wording import misfit_words, percentage, two_digits
 
 if TYPE_CHECKING:
     from valve_friction_ros.model.valve import Valve
@@ -74,4 +74,4 @@ def stem_distance(rms: float, valve: "Valve") -> str:
     """Write the distance of simulated and measured stem, in micrometres and percent of travel."""
     share = valve.share_of_travel(rms)
     of_travel = f", {percentage(share)} of travel" if math.isfinite(share) else ""
-    return f"{rms * 1e6:.3g} µm rms from the measured stem{of_travel}"
+    return f"{two_digits(rms * 1e6)} µm rms{of_travel}"
