@@ -324,7 +324,9 @@ def test_every_source_has_words():
     """Also the place of the stem at first, which is no imperfection of a plant."""
     for name in (*ABSENT, "start_position"):
         doubt = main_doubt(Budget(1.0, 0.0, {name: 2.0}), interval_share(1.0, 0.2))
-        assert doubt.startswith("its interval is ±20 % of its value; not determined by the record: ")
+        assert doubt.startswith(
+            "its interval is ±20 % of its value; not determined by the record: "
+        )
     assert main_doubt(Budget(1.0, 0.0, {"drift": 0.1}), 0.2).endswith(
         "motion that the model does not explain"
     )
