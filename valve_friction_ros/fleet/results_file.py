@@ -293,11 +293,16 @@ def page_text(rows: Iterable[_Row], name: str, zone: str = "") -> str:
     `ranked`, and by any column at a click.
     """
     lines = [_line(row, zone) for row in ranked(rows)]
+    valves = len({line["name"] for line in lines})
+    subject = "1 valve" if valves == 1 else f"{valves} valves"
+    if valves < len(lines):
+        subject += f" in {len(lines)} recordings"
     return (
         page_environment("valve_friction_ros.fleet")
         .get_template("page.html")
         .render(
             name=name,
+            subject=subject,
             lines=lines,
             counts=Counter(line["status"] for line in lines),
             size=(WIDTH, HEIGHT),

@@ -421,7 +421,7 @@ def set_anew_at_rests(record: FittedRecord) -> FittedRecord:
 
     A resting stem has forgotten all but its position, so each move is independent: a single jump
     that is simulated at the wrong time then spoils no other. The price is the noise of that
-    position; the end of a fit does without.
+    position.
     """
     positions = np.interp(
         np.arange(record.force.size) * record.period, record.time, record.position

@@ -315,7 +315,7 @@ class _Search:
         return starts
 
     def curved(self) -> PosteriorFit | None:
-        """Fit a friction that falls with speed, from the friction curves, each move alone first.
+        """Fit a friction that falls with speed, from the friction curves.
 
         None without such curves, or where the first fit takes all the work.
         """
@@ -608,13 +608,13 @@ def search(
     """Find the most probable model of a record, and its competitors.
 
     The friction curve starts a fit of few coordinates, which starts a fit with all imperfections.
-    Where the residual exceeds noise, a fit with friction that falls with speed follows, of each
-    move by itself first; it starts at the `static_friction`, N, of the departures, if known. Where
-    that fails too, or there is no curve, the sliding friction of a plain regression is split into
-    F_c and F_v in several ways, without and with a slip; the split whose simulated stem is nearest
-    starts a fit, and again with the likeliest lag. Then follows a fit with a dead zone. At the end
-    the likelihood is followed along the lag, for which viscous friction compensates, and to a slow
-    sensor of the stem in place of all viscous friction.
+    Where the residual exceeds noise, a fit with friction that falls with speed follows; it starts
+    at the `static_friction`, N, of the departures, if known. Where that fails too, or there is no
+    curve, the sliding friction of a plain regression is split into F_c and F_v in several ways,
+    without and with a slip; the split whose simulated stem is nearest starts a fit, and again with
+    the likeliest lag. Then follows a fit with a dead zone. At the end the likelihood is followed
+    along the lag, for which viscous friction compensates, and to its two ends: viscous friction in
+    place of the lag, and a slow sensor of the stem in place of all viscous friction.
 
     Raises
     ------
