@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from valve_friction_ros.identification.engine.broad_model import SWINGING, BroadModel
 from valve_friction_ros.identification.engine.coordinates import MAIN, Coordinates
-from valve_friction_ros.identification.engine.imperfections import TIMING, Profile
+from valve_friction_ros.identification.engine.imperfections import IMPERFECTIONS, TIMING, Profile
 from valve_friction_ros.identification.engine.lags import (
     LARGEST_LAG,
     LagPrior,
@@ -63,8 +63,9 @@ UNLIKELY = 12.0
 """Penalty of the priors beyond which a fit is doubted: such imperfections together are two
 standard deviations or more above what is usual for their number."""
 
-_LOST = 0.5
-"""Share by which the sliding friction in gaps may differ from the mean."""
+_LOST = NORMAL_QUANTILE * IMPERFECTIONS["in_record"].deviation
+"""Share by which the sliding friction in gaps may differ from the mean: as friction may change
+during a record."""
 
 _LOOP = 0.02
 """Share by which the work of friction from the averaged signals may be wrong."""
