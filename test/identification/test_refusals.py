@@ -413,8 +413,8 @@ def turned_over(upright):
 
 def test_a_stem_against_the_pressure():
     assert refusal(require_related_signals, turned_over(strokes())) == (
-        "the stem moves against the pressure: invert the position so that it increases in the "
-        "direction in which pressure pushes the stem"
+        "the stem moves against the pressure: invert the position (for a file: inverted_position) "
+        "so that it increases in the direction in which pressure pushes the stem"
     )
 
 

@@ -332,6 +332,7 @@ def _of_simulation(
         if "mass" in numbers and not prior.lag.is_known:
             numbers["mass"] = _beside_lags(numbers["mass"], fit.at["spring_constant"])
         misfit = fit_misfit(fit, numbers)
+    imperfections = estimated(fits, found_sizes, prior.lag)
     return _Outcome(
         parameters=fit_verdicts(fits, numbers, settings, misfit, profile),
         numbers=numbers,
@@ -342,8 +343,8 @@ def _of_simulation(
             f"{stem_distance(misfit.rms, valve)}, of which "
             f"{two_digits(misfit.systematic * 1e6)} µm is more than noise",
         ),
-        warnings=found_imperfections(fit),
-        imperfections=estimated(fits, found_sizes, prior.lag),
+        warnings=found_imperfections(fit, imperfections["lag"]),
+        imperfections=imperfections,
         correlation=_correlation(fit, numbers_of(profile)),
         model=_model(fit),
         stem=_stem(fit, record),

@@ -12,8 +12,9 @@
 import math
 
 from valve_friction_ros.identification.engine.imperfections import IMPERFECTIONS, TIMING
-from valve_friction_ros.identification.engine.intervals import ROUNDING, Budget
+from valve_friction_ros.identification.engine.intervals import ROUNDING, Budget, Estimated
 from valve_friction_ros.identification.engine.posterior_fit import PosteriorFit
+from valve_friction_ros.identification.trust.uncertainty import NORMAL_QUANTILE
 from valve_friction_ros.identification.units import UNITS
 from valve_friction_ros.wording import percentage, two_digits
 
@@ -75,11 +76,15 @@ def slips(fit: PosteriorFit) -> bool:
     return fit.at["slip_force"] > max(_SURE * _deviation(fit, "slip_force"), _LEAST_SLIP * static)
 
 
-def found_imperfections(fit: PosteriorFit) -> tuple[str, ...]:
-    """Return a sentence for each imperfection that is certain, the most certain first."""
+def found_imperfections(fit: PosteriorFit, lag: Estimated) -> tuple[str, ...]:
+    """Return a sentence for each imperfection that is certain, the most certain first.
+
+    A single source of a lag is certain only if their sum is, `lag`, s, over all probable fits.
+    """
     found = []
+    is_late = abs(lag.value) > _SURE * lag.half_width / NORMAL_QUANTILE
     for name in fit.names:
-        if name == "slip_force" and not slips(fit):
+        if (name == "slip_force" and not slips(fit)) or (name in TIMING and not is_late):
             continue
         least = _LEAST.get(name, 1e-3 if name in TIMING else math.inf)
         value, deviation = fit.at[name], _deviation(fit, name)

@@ -280,8 +280,9 @@ def require_related_signals(recording: Recording) -> None:
         )
     if slope < 0 and share > _SURELY_FOLLOWED and not dissipates:
         raise RefusalError(
-            f"the stem moves against the {words}: invert the position so that it increases in the "
-            f"direction in which {words} pushes the stem"
+            f"the stem moves against the {words}: invert the position (for a file: "
+            f"inverted_position) so that it increases in the direction in which {words} pushes the "
+            "stem"
         )
     steps, span = np.diff(position), float(np.ptp(position))
     step = float(np.max(np.abs(steps)))
