@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from valve_friction_ros.identification import identify
-from valve_friction_ros.identification.engine.broad_model import ABSENT, BroadModel
+from valve_friction_ros.identification.engine.broad_model import ABSENT, SWINGING, BroadModel
 from valve_friction_ros.identification.engine.fitted_record import fitted_record
 from valve_friction_ros.identification.engine.imperfections import TIMING, Profile
 from valve_friction_ros.identification.engine.intervals import Budget
@@ -318,6 +318,16 @@ def test_a_friction_that_falls_with_speed_leaves_that_speed_free(model):
     search = _Search(model.record, Prior(LagPrior(0.01), TRUE["mass"], {}))
     assert "stribeck_velocity" in search.full({**search.base, **falling}).names
     assert "stribeck_velocity" not in search.full({**search.base, **TRUE}).names
+
+
+def test_no_fit_without_a_lag_begins_with_a_stem_that_swings(model, monkeypatch):
+    """Its derivatives overflow: a lag of -10 ms in place of no viscous friction leaves less."""
+    search = _Search(model.record, Prior(LagPrior(0.01), TRUE["mass"], {}))
+    best, starts = search.full({**search.base, **TRUE}), []
+    monkeypatch.setattr(search, "fit", lambda start, *_: starts.append(start))
+    search.without_lag(best, {**best.at, "viscous_friction": 1e-15, "delay": -0.01})
+    (start,) = starts
+    assert start["viscous_friction"] >= SWINGING * start["spring_constant"]
 
 
 def test_every_source_has_words():

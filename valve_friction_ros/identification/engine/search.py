@@ -439,9 +439,11 @@ class _Search:
     def without_lag(self, best: PosteriorFit, at: Coordinates) -> PosteriorFit:
         """Fit without a lag, from the linear model or from viscous friction in place of the lag."""
         delayed = at["viscous_friction"] + lag_of(at) * at["spring_constant"]
-        least = _LEAST_LEFT * at["viscous_friction"]
-        replaced = {**at, **dict.fromkeys(TIMING, 0.0), "viscous_friction": max(delayed, least)}
-        start = nearest(self.exact, [self.along(best, at, 0.0), replaced])[0]
+        replaced = {**at, **dict.fromkeys(TIMING, 0.0), "viscous_friction": delayed}
+        start = dict(nearest(self.exact, [self.along(best, at, 0.0), replaced])[0])
+        # A stem that swings has no derivatives that can be trusted.
+        least = SWINGING * start["spring_constant"]
+        start["viscous_friction"] = max(start["viscous_friction"], least)
         return self.fit(start, best.names, _FEW_STEPS, self.exact, 0.0)
 
     def along(self, best: PosteriorFit, at: Coordinates, lag: float) -> Coordinates:
