@@ -235,6 +235,11 @@ def headline(statement: Statement) -> str:
 # Numbers and times for people
 
 
+def capitalised(text: str) -> str:
+    """Write a text with a capital first letter."""
+    return f"{text[:1].upper()}{text[1:]}"
+
+
 def two_digits(value: float) -> str:
     """Write a number with two significant digits, or as an integer from 100 on; no exponent."""
     return f"{value:.2g}" if abs(value) < 99.5 else f"{value:.0f}"
@@ -835,4 +840,4 @@ def alarm_advice(kind: str, level: str) -> str:
     """Return what to do about an alarm as a sentence, by its name and the name of its level."""
     state = _STATE_OF_ALARM.get((kind, level), "")
     advice = friction_advice(state) or _ADVICE.get(kind, "")
-    return advice and f"{advice[0].upper()}{advice[1:]}."
+    return advice and f"{capitalised(advice)}."

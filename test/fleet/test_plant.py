@@ -530,3 +530,21 @@ class TestSeizedStem:
         assert (alarm.kind.value, alarm.condition.level.name) == ("stuck", "ERROR")
         assert alarm.state.value == "unacknowledged"
         assert alarm.raised == seized.span.end
+
+    def test_without_a_baseline_it_is_refused_and_no_alarm(self, answers, tmp_path):
+        folder, *_ = answers
+        shutil.copytree(folder / "exports", tmp_path / "exports")
+        (tmp_path / "exports" / "FV-101 0.csv").unlink()
+        arguments = [
+            "identify-folder", str(tmp_path / "exports"), "--plant", str(folder / "valves.csv"),
+            "--history", str(tmp_path / "history.sqlite"), "--jobs", "1",
+            "--output", str(tmp_path / "friction.csv"), "--output", str(tmp_path / "friction.html"),
+        ]  # fmt: skip
+        with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
+            assert run(arguments) == 2
+        with (tmp_path / "friction.csv").open() as stream:
+            (seized,) = csv.DictReader(stream)
+        assert (seized["level"], seized["what_to_do"]) == ("", "")
+        assert ">refused<" in (tmp_path / "friction.html").read_text()
+        file = HistoryFile(tmp_path / "history.sqlite")
+        assert not read_alarms(file, kept_valve("FV-101").name)

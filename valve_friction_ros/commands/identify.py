@@ -39,10 +39,12 @@ from valve_friction_ros.health import (
     FrictionLimits,
     Level,
     Survey,
-    diagnose_valve,
 )
-from valve_friction_ros.health.friction_monitor import MonitorSettings, identify_recording
-from valve_friction_ros.health.standstill import held_diagnosis
+from valve_friction_ros.health.friction_monitor import (
+    MonitorSettings,
+    diagnose_outcome,
+    identify_recording,
+)
 from valve_friction_ros.health.valve_numbers import RefusedRecordError
 from valve_friction_ros.identification import (
     RefusalError,
@@ -155,10 +157,12 @@ def _identified(
     try:
         result = identify_recording(recording, settings)
     except RefusedRecordError as refusal:
-        held = held_diagnosis(refusal.numbers, baseline, settings.valve, settings.limits)
-        shown = refusal if held is None else RefusalError(f"{refusal}; {held}")
+        held, _ = diagnose_outcome(refusal, baseline, settings)
+        if held.level is Level.OK:
+            return _Answer(recorded, recorded.refused(refusal))
+        shown = RefusalError(f"{refusal}; {held}")
         return _Answer(recorded, recorded.refused(shown), held)
-    return _Answer(recorded, result, *diagnose_valve(result, baseline, settings.limits))
+    return _Answer(recorded, result, *diagnose_outcome(result, baseline, settings))
 
 
 def _of_healthy(

@@ -41,6 +41,7 @@ from valve_friction_ros.planning.steps import (
     FINEST_PRESSURE,
     ShownUnit,
     form_of,
+    stem_limits,
     table_of,
 )
 from valve_friction_ros.records.files import write_whole
@@ -185,7 +186,7 @@ def print_plan(plan: StrokePlan, path: Path) -> None:
     for remark in plan_remarks(plan):
         console.print(f"note: {remark}")
     low, high = plan.limits.lowest, plan.limits.highest
-    lowest, highest = set_points(plan, None)[0].stem
+    lowest, highest = stem_limits(plan)
     console.print(
         "Nothing has been moved. Before: agree with operations, put the loop in manual, keep "
         f"people off the stem, and bring the pressure slowly to {test.pressures[0] / 1e3:.4g} kPa. "
@@ -218,8 +219,7 @@ def print_plan(plan: StrokePlan, path: Path) -> None:
 def _watched(plan: StrokePlan, path: Path) -> dict[str, Any]:
     """Return the parameters of the node that monitors the test."""
     given, travel = player(plan, path), plan.valve.travel
-    stems = [step.stem for step in set_points(plan, None)]
-    lowest, highest = min(low for low, _ in stems), max(high for _, high in stems)
+    lowest, highest = stem_limits(plan)
     return {
         **{name: given[name] for name in ("file", "file_minimum", "file_maximum", "file_rate")},
         "position_minimum": round(lowest * travel, 6),

@@ -37,16 +37,17 @@ from valve_friction_ros.health import (
     Finding,
     FrictionHold,
     FrictionLimits,
-    diagnose_valve,
 )
 from valve_friction_ros.health.alarm_conditions import ALARM_OF_SIDE, shown_by
 from valve_friction_ros.health.alarms import NO_CONDITION, Condition
-from valve_friction_ros.health.diagnosis import FrictionState
-from valve_friction_ros.health.friction_monitor import MonitorSettings, identify_recording
+from valve_friction_ros.health.friction_monitor import (
+    MonitorSettings,
+    diagnose_outcome,
+    identify_recording,
+)
 from valve_friction_ros.health.levels import Level
 from valve_friction_ros.health.measured import Measured
-from valve_friction_ros.health.standstill import HELD_FRICTION, held_diagnosis
-from valve_friction_ros.health.valve_diagnosis import ValveDiagnosis
+from valve_friction_ros.health.standstill import HELD_FRICTION
 from valve_friction_ros.health.valve_numbers import RefusedRecordError, valve_numbers
 from valve_friction_ros.history import (
     HistoryEntry,
@@ -64,7 +65,6 @@ from valve_friction_ros.records.recorded_valve import RecordedValve
 from valve_friction_ros.records.recordings import ReadingOptions, read_recordings
 from valve_friction_ros.streams import utc
 from valve_friction_ros.streams.samples import nanoseconds
-from valve_friction_ros.wording import Code, said
 
 FILING = "filing"
 """Extra cell of a row until its result is filed."""
@@ -130,15 +130,6 @@ class Filing:
             return self.outcome.numbers
         return valve_numbers(self.outcome)
 
-    def diagnosed(self, baseline: Baseline | None) -> ValveDiagnosis:
-        """Compare the outcome with a baseline."""
-        limits = self.settings.limits
-        if not isinstance(self.outcome, RefusedRecordError):
-            return diagnose_valve(self.outcome, baseline, limits)
-        held = held_diagnosis(self.outcome.numbers, baseline, self.settings.valve, limits)
-        unknown = said(Code.NO_ESTIMATE, reason=str(self.outcome))
-        return ValveDiagnosis(held or Diagnosis.of(FrictionState.UNKNOWN, unknown), ())
-
 
 @dataclass(frozen=True)
 class Filed:
@@ -196,13 +187,12 @@ class _Alarms:
         time = filing.span.end
         if self._hold.until is not None and time <= self._hold.until:
             return
+        looked = self._hold.looked(diagnosis, time, filing.settings.limits)
+        self._hold = replace(looked, until=time)
         if isinstance(filing.outcome, RefusedRecordError):
-            self._hold = replace(self._hold, until=time)
             held = Condition(diagnosis.level, diagnosis.status_signal, diagnosis.message)
             conditions = {} if diagnosis.level is Level.OK else {AlarmKind.STUCK: held}
         else:
-            looked = self._hold.looked(diagnosis, time, filing.settings.limits)
-            self._hold = replace(looked, until=time)
             conditions = {kind: self._hold.conditions[side] for side, kind in ALARM_OF_SIDE.items()}
             conditions[AlarmKind.WHOLE_VALVE] = shown_by(findings)
             conditions[AlarmKind.STUCK] = NO_CONDITION
@@ -256,8 +246,11 @@ def file_results(place: Path, filings: Iterable[Filing], first_is_baseline: bool
             in_force[one.tag] = _begin(history, valve, one)
             begun += [one.tag] if in_force[one.tag] is not None else []
         baseline = in_force[one.tag]
-        diagnosis, findings = one.diagnosed(baseline)
-        cells[one.recording, one.tag] = diagnosis_cells(diagnosis, findings)
+        diagnosis, findings = diagnose_outcome(one.outcome, baseline, one.settings)
+        is_refused = isinstance(one.outcome, RefusedRecordError)
+        cells[one.recording, one.tag] = (
+            _held_cells(diagnosis) if is_refused else diagnosis_cells(diagnosis, findings)
+        )
         if (one.tag, one.span.begin // 10**9) in before:
             known += 1
             continue
@@ -376,33 +369,38 @@ def _dated(job: Job, result: Result) -> str:
     return f"{stem}_{utc(1e9 * result.recording.start_time):%Y%m%dT%H%M%SZ}_"
 
 
+def _held_cells(diagnosis: Diagnosis) -> Mapping[str, Cell]:
+    """Fill the cells of a refused valve with what held its stem, if that is an alarm."""
+    return diagnosis_cells(diagnosis) if diagnosis.level > Level.OK else {}
+
+
 def _cells(job: Job, recorded: RecordedValve) -> Mapping[str, Cell]:
     options = job.options
     name = options.tag or recorded.name
     baseline = options.baselines.get(name) or job.baseline
-    cells: dict[str, Any]
-    outcome: Result | RefusedRecordError
     try:
         recording = recorded.recording()
-        settings = MonitorSettings(
-            options.valve,
-            options.settings,
-            options.method,
-            options.limits,
-            window=max(recording.duration, recording.sample_period),
-        )
-        outcome = result = identify_recording(recording, settings)
-    except RefusedRecordError as refusal:
-        cells = {**error_cells(name, str(refusal), job.path)}
-        held = held_diagnosis(refusal.numbers, baseline, options.valve, options.limits)
-        cells |= {} if held is None else diagnosis_cells(held)
-        outcome = refusal
     except RefusalError as refusal:
         return error_cells(name, str(refusal), job.path)
+    settings = MonitorSettings(
+        options.valve,
+        options.settings,
+        options.method,
+        options.limits,
+        window=max(recording.duration, recording.sample_period),
+    )
+    outcome: Result | RefusedRecordError
+    cells: dict[str, Any]
+    try:
+        outcome = identify_recording(recording, settings)
+    except RefusedRecordError as refusal:
+        outcome = refusal
+    diagnosis, found = diagnose_outcome(outcome, baseline, settings)
+    if isinstance(outcome, RefusedRecordError):
+        cells = {**error_cells(name, str(outcome), job.path), **_held_cells(diagnosis)}
     else:
-        diagnosis, found = diagnose_valve(result, baseline, options.limits)
-        cells = dict(result_cells(name, result, diagnosis, recorded.notes, found))
-        cells |= _report(job, recorded, result, baseline)
+        cells = dict(result_cells(name, outcome, diagnosis, recorded.notes, found))
+        cells |= _report(job, recorded, outcome, baseline)
     if job.is_filed:
         cells[FILING] = Filing.of(job.name, options.tag, settings, recording, outcome)
     return cells

@@ -184,9 +184,10 @@ def _number(row: Mapping[str, Cell], name: str) -> float:
 def status_of(row: Mapping[str, Cell]) -> RowStatus:
     """Return the status of a valve, coloured ``error``, ``warn``, ``maybe``, ``ok`` or ``none``."""
     level, ratio = _level(row), _number(row, "ratio")
-    if level is None or row.get("error"):
-        known = "" if level is None else level.name.lower()
-        return RowStatus("stuck", known) if known else RowStatus("refused", "none")
+    if level is None:
+        return RowStatus("refused", "none")
+    if row.get("error"):  # refused, but its test shows what held the stem
+        return RowStatus("stuck", level.name.lower())
     if level > (_friction_level(row) or Level.OK):
         return RowStatus("changed", level.name.lower())
     if level is Level.OK or row["ne_107"] == StatusSignal.CHECK_FUNCTION.value:
@@ -195,9 +196,9 @@ def status_of(row: Mapping[str, Cell]) -> RowStatus:
             return _SURVEYS[str(row["survey"])]
         if level is Level.OK or by_ratio.colour == _MAYBE:
             return by_ratio
-    if row["ne_107"] == StatusSignal.MAINTENANCE_REQUIRED.value and ratio < 1:
-        return RowStatus("fallen", level.name.lower())
-    return RowStatus(_BY_SIGNAL[str(row["ne_107"])], level.name.lower())
+    has_fallen = row["ne_107"] == StatusSignal.MAINTENANCE_REQUIRED.value and ratio < 1
+    word = "fallen" if has_fallen else _BY_SIGNAL[str(row["ne_107"])]
+    return RowStatus(word, level.name.lower())
 
 
 def _status_of_ratio(ratio: float) -> RowStatus:

@@ -29,7 +29,13 @@ from valve_friction_ros.health.known_numbers import KnownNumbers
 from valve_friction_ros.health.levels import Finding, Level, StatusSignal
 from valve_friction_ros.health.measured import Measured, valve_changes
 from valve_friction_ros.health.standstill import held_finding, held_numbers
-from valve_friction_ros.health.valve_diagnosis import ValveLimits, diagnose_numbers, qualified
+from valve_friction_ros.health.valve_diagnosis import (
+    ValveDiagnosis,
+    ValveLimits,
+    diagnose_numbers,
+    diagnose_valve,
+    qualified,
+)
 from valve_friction_ros.health.valve_numbers import (
     RefusedRecordError,
     numbers_of_refused,
@@ -213,6 +219,26 @@ def identify_recording(recording: Recording, settings: MonitorSettings) -> Resul
         if isinstance(refusal, LittleMotionError):
             numbers |= held_numbers(recording, valve)
         raise RefusedRecordError.of(refusal, numbers) from refusal
+
+
+def diagnose_outcome(
+    outcome: Result | RefusedRecordError, baseline: Baseline | None, settings: MonitorSettings
+) -> ValveDiagnosis:
+    """Compare a result with a baseline (`diagnose_valve`), or what held the stem in a refused test.
+
+    The diagnosis of any other refusal is OK, and unknown.
+    """
+    limits = settings.limits
+    if not isinstance(outcome, RefusedRecordError):
+        return diagnose_valve(outcome, baseline, limits)
+    held = baseline and held_finding(outcome.numbers, baseline, settings.valve, limits)
+    if not held:
+        return ValveDiagnosis(_no_estimate(str(outcome)), ())
+    return ValveDiagnosis(Diagnosis(held.level, held.status_signal, held.statement, None), ())
+
+
+def _no_estimate(reason: str | Statement) -> Diagnosis:
+    return Diagnosis.of(FrictionState.UNKNOWN, said(Code.NO_ESTIMATE, reason=reason))
 
 
 def _of_means(result: Result, count: int) -> Result:
@@ -505,8 +531,7 @@ class FrictionMonitor:
                 aged = said(Code.AGED, of=diagnosis.statement, age=age)
                 diagnosis = replace(diagnosis, statement=aged)
         else:
-            reason = self._refusal or said(Code.NOTHING_IDENTIFIED)
-            return Diagnosis.of(FrictionState.UNKNOWN, said(Code.NO_ESTIMATE, reason=reason))
+            return _no_estimate(self._refusal or said(Code.NOTHING_IDENTIFIED))
         if self._refusal is None:
             return diagnosis
         refused = said(Code.REFUSED, reason=self._refusal, of=diagnosis.statement)

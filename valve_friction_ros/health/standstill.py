@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from valve_friction_ros.health.baseline import Baseline
-from valve_friction_ros.health.diagnosis import Diagnosis, FrictionLimits
+from valve_friction_ros.health.diagnosis import FrictionLimits
 from valve_friction_ros.health.levels import Finding, Level, StatusSignal
 from valve_friction_ros.health.measured import Measured
 from valve_friction_ros.model.recording import Recording
@@ -232,15 +232,6 @@ def held_finding(
         leads=True,
         friction_ratio=ratio,
     )
-
-
-def held_diagnosis(
-    numbers: Mapping[str, Measured], baseline: Baseline | None, valve: Valve, limits: FrictionLimits
-) -> Diagnosis | None:
-    """Return the diagnosis of a refused record by `held_finding`, or None without one."""
-    if baseline is None or (held := held_finding(numbers, baseline, valve, limits)) is None:
-        return None
-    return Diagnosis(held.level, held.status_signal, held.statement, None)
 
 
 def _surely_held(

@@ -117,6 +117,16 @@ def _tells(before: float, now: float, after: float, largest: float) -> str:
     return "; ".join(words)
 
 
+def stem_limits(plan: StrokePlan, margin: float = 0.05) -> tuple[float, float]:
+    """Return the limits of the stem at which a test is aborted, shares of the travel.
+
+    They leave a `margin`, a share of the travel, beside the reach of all planned valves.
+    """
+    lows, highs = zip(*(one.reach for one in plan.forecasts), strict=True)
+    travel = plan.valve.travel
+    return max(min(lows) / travel - margin, 0.0), min(max(highs) / travel + margin, 1.0)
+
+
 def set_points(
     plan: StrokePlan, signal: tuple[float, float] | None = None, margin: float = 0.05
 ) -> tuple[SetPoint, ...]:
@@ -129,7 +139,7 @@ def set_points(
     signal : tuple of float, optional
         Pressures of a signal of 0 and 100 %, Pa; by default `signal_range`.
     margin : float
-        Share of the travel by which the stem may leave the reach of all planned valves.
+        Margin of `stem_limits`.
 
     Raises
     ------
@@ -141,12 +151,7 @@ def set_points(
         raise ValueError(
             f"the range of the signal must be given from low to high, got {low:g} to {high:g} Pa"
         )
-    travel, test = plan.valve.travel, plan.test
-    reaches = [one.reach for one in plan.forecasts]
-    stem = (
-        max(min(reach[0] for reach in reaches) / travel - margin, 0.0),
-        min(max(reach[1] for reach in reaches) / travel + margin, 1.0),
-    )
+    test, stem = plan.test, stem_limits(plan, margin)
     times, pressures = test.times.tolist(), test.pressures.tolist()
     span = plan.band.high - plan.band.low
     rates = [

@@ -57,7 +57,7 @@ from valve_friction_ros.reports.page import (
 from valve_friction_ros.response import SIZES, ResponseSummary, Spread, StepAnswer
 from valve_friction_ros.streams import utc, utc_day
 from valve_friction_ros.usage import LimitState, Usage, ValveUsage
-from valve_friction_ros.wording import member_words, percentage
+from valve_friction_ros.wording import capitalised, member_words, percentage
 
 _VERDICTS = (
     "Identified: half the interval is at most 5 % of the value, and nothing casts doubt on it. "
@@ -122,7 +122,7 @@ def _sections(record: IdentifiedRecord) -> Iterator[Section]:
     yield _friction(record)
     if table := valve_table(record):
         found = [one.message for one in record.findings] or [_NOTHING_ELSE]
-        told = (Paragraph(f"{one[0].upper()}{one[1:]}.") for one in found)
+        told = (Paragraph(f"{capitalised(one)}.") for one in found)
         yield Section(_WHOLE_VALVE, (*told, table))
     if record.history is not None:
         yield _trend(record.history)
@@ -315,7 +315,7 @@ def _life(limits: Sequence[LimitState]) -> tuple[PageTable | Paragraph, ...]:
         )
         for one in limits
     )
-    warnings = (f"{one.message[0].upper()}{one.message[1:]}." for one in limits if one.warns)
+    warnings = (f"{capitalised(one.message)}." for one in limits if one.warns)
     return PageTable(columns, rows), *map(Paragraph, warnings)
 
 
@@ -370,7 +370,7 @@ def response_section(response: ResponseSummary) -> Section | None:
         ),
     )
     causes = " ".join(
-        f"{name[0].upper()}{name[1:]}: {member_words(response.cause(which), 'cause')}."
+        f"{capitalised(name)}: {member_words(response.cause(which), 'cause')}."
         for name, which in _CAUSES
     )
     words = (

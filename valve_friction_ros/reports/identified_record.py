@@ -43,6 +43,7 @@ from valve_friction_ros.reports.page import Colour, Conclusion
 from valve_friction_ros.response import ResponseSummary
 from valve_friction_ros.usage import LimitState, ValveUsage
 from valve_friction_ros.wording import (
+    capitalised,
     finding_advice,
     friction_advice,
     in_zone,
@@ -290,7 +291,7 @@ def diagnosis_sentence(record: IdentifiedRecord) -> str:
     doubt = _doubt(record)
     told = f"{doubt}{finding.what}{_consequence(record)}: {finding.advice}"
     sentences = (told, *(one.message for one in record.findings))
-    return " ".join(f"{one[0].upper()}{one[1:]}." for one in sentences)
+    return " ".join(f"{capitalised(one)}." for one in sentences)
 
 
 def _frictions(record: IdentifiedRecord) -> list[Parameter]:

@@ -160,6 +160,21 @@ class RecordBuffer:
     """
 
     def __init__(self, valve: Valve, window: float) -> None:
+        self._ranges = {
+            Signal.PRESSURE: (
+                *valve.readings,
+                said(
+                    Code.SENSOR_RANGE,
+                    lowest=valve.pressure_minimum,
+                    highest=valve.pressure_maximum,
+                ),
+            ),
+            Signal.POSITION: (
+                -MOST_POSITION,
+                MOST_POSITION,
+                said(Code.ANY_VALVE_RANGE, lowest=-MOST_POSITION, highest=MOST_POSITION),
+            ),
+        }
         self._valve = valve
         self._window = nanoseconds(window)
         self._pressure = SampleBuffer(window)
@@ -240,12 +255,11 @@ class RecordBuffer:
         itself, because the order decides which samples remain after a clearing.
         """
         pressure, position = arrivals.samples(Kind.PRESSURE), arrivals.samples(Kind.POSITION)
-        lowest, highest = self._valve.readings
         if not (
             pressure.stamps.size + position.stamps.size == arrivals.stamps.size
             and _are_good(self._pressure.last_stamp, pressure)
             and _are_good(self._position.last_stamp, position)
-            and ((lowest <= pressure.values) & (pressure.values <= highest)).all()
+            and self._valve.sensor_reads(pressure.values).all()
             and (np.abs(position.values) <= MOST_POSITION).all()
         ):
             return self._add_one_by_one(arrivals)
@@ -293,24 +307,13 @@ class RecordBuffer:
         if stamp == last or not math.isfinite(value):
             fault = SampleFault.REPEATED if stamp == last else SampleFault.NOT_FINITE
             return self._reject(stamp, signal, fault)
-        lowest, highest = self.bounds(signal)
+        lowest, highest, span = self._ranges[signal]
         if not lowest <= value <= highest:
-            whose = Code.ANY_VALVE_RANGE
-            if signal is Signal.PRESSURE:
-                whose = Code.SENSOR_RANGE
-                lowest, highest = self._valve.pressure_minimum, self._valve.pressure_maximum
-            span = said(whose, lowest=lowest, highest=highest)
             return self._reject(stamp, signal, SampleFault.OUT_OF_RANGE, span=span)
         buffer.append(stamp, value)
         self._taken += 1
         self._first_stamp = stamp if self._first_stamp is None else self._first_stamp
         return None, None
-
-    def bounds(self, signal: Signal) -> tuple[float, float]:
-        """Return the lowest and the highest accepted reading, Pa or m."""
-        if signal is Signal.PRESSURE:
-            return self._valve.readings
-        return -MOST_POSITION, MOST_POSITION
 
     def _reject(
         self, stamp: int, signal: Signal, fault: SampleFault, **facts: Statement

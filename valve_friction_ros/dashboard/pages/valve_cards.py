@@ -47,7 +47,7 @@ from valve_friction_ros.health import AlarmEvent, Baseline
 from valve_friction_ros.history import HistoryEntry, ValveHistory, drift_text
 from valve_friction_ros.outside_text import printable
 from valve_friction_ros.streams import utc_day
-from valve_friction_ros.wording import number_and_width
+from valve_friction_ros.wording import capitalised, number_and_width
 
 _VERDICTS = {"identified": "ok", "weak": "warn", "not identifiable": "unknown", "fixed": "unknown"}
 _TITLES = (("parameter", ""), ("value", "vf-n"), ("", "vf-width"), ("", ""), ("verdict", ""))
@@ -185,7 +185,7 @@ def _trend_words(kept: ValveHistory) -> str:
         return "No trend yet: it needs estimates from at least four days since the baseline."
     if not trend.is_significant:
         return f"No significant drift of the {trend.what} in {trend.days} days with estimates."
-    words = f"{trend.what[0].upper()}{trend.what[1:]}: {drift_text(trend)}"
+    words = f"{capitalised(trend.what)}: {drift_text(trend)}"
     if trend.crossing is None:
         return f"{words}."
     early, late = map(utc_day, (trend.crossing.earliest, trend.crossing.latest))
