@@ -34,9 +34,12 @@ from valve_friction_ros.figures.record_figures import (
 )
 from valve_friction_ros.identification import (
     Drawing,
+    IdentificationSettings,
     Parameter,
     Verdict,
+    identify_bench,
     identify_plant,
+    identify_published,
     identify_signature,
     validate,
 )
@@ -52,12 +55,52 @@ from valve_friction_ros.model import (
     KarnoppParameters,
     Recording,
     SensorNoise,
+    SineWave,
     TriangleWave,
     simulate,
 )
 
 NAN = math.nan
 LABELS = {"pressure", "stem", "coulomb", "sigma", "signature"}
+
+
+@pytest.fixture(scope="module")
+def record(benches):
+    """Four strokes at 100 Hz, with a little noise on both sensors."""
+    pressure = SineWave(period=4.0).sample(np.arange(800) / 100)
+    position = simulate(BENCH_VALVE, benches["low"].parameters, pressure, 0.01).position
+    noise = SensorNoise(position=10e-6, pressure=100.0, seed=1)
+    return noise.applied_to(Recording(0.01, pressure, position))
+
+
+@pytest.fixture(scope="module")
+def result(record):
+    """What every panel shows at once: the sweep of one method, the simulated stem of another."""
+    settings = IdentificationSettings(position_bias=1.13e-3)
+    swept = identify_published(record, BENCH_VALVE, settings)
+    simulated = identify_bench(record, BENCH_VALVE, settings)
+    return dataclasses.replace(
+        swept,
+        parameters=simulated.parameters,
+        stem=simulated.stem,
+        misfit=simulated.misfit,
+        fit=simulated.fit,
+        rms=simulated.rms,
+    )
+
+
+@pytest.fixture(scope="module")
+def with_parameters(result):
+    """Function of (value, half width, verdict) by name: the result with these instead."""
+
+    def build(**changes):
+        changed = {
+            name: Parameter(name, value, half_width / 2, half_width, verdict, "reason")
+            for name, (value, half_width, verdict) in changes.items()
+        }
+        return dataclasses.replace(result, parameters={**result.parameters, **changed})
+
+    return build
 
 
 @pytest.fixture(scope="module")
@@ -194,9 +237,10 @@ class TestVerdict:
         told = title_of(identification_figure(found)).split("; ")
         assert told[:2] == ["sliding friction 53.7 ± 5.2 N (weak)", "$k$ 205000 N/m (fixed)"]
 
-    def test_a_number_without_a_verdict_is_never_shown(self, nothing_known):
+    def test_a_number_without_a_verdict_is_never_shown(self, with_parameters, result):
         """What is withheld leaves no number in the title, and no line, band or note of it."""
-        figure = identification_figure(nothing_known)
+        withheld = dict.fromkeys(result.parameters, (NAN, NAN, Verdict.NOT_IDENTIFIABLE))
+        figure = identification_figure(with_parameters(**withheld))
         told = title_of(figure).split("; ")[:3]
         assert told == [f"${name}$ not identifiable" for name in ("F_c", "F_v", "k")]
         assert "dead band" not in title_of(figure)
