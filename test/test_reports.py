@@ -27,8 +27,8 @@ from valve_friction_ros.identification import (
     Verdict,
     identify_bench,
 )
-from valve_friction_ros.identification.published.estimate import chosen_region
-from valve_friction_ros.identification.trust.misfit import Misfit
+from valve_friction_ros.identification.published.sweep import chosen_region
+from valve_friction_ros.identification.trust.verdict import Misfit
 from valve_friction_ros.model import BENCH_VALVE, Recording, SensorNoise, SineWave, simulate
 from valve_friction_ros.reports import (
     Colour,

@@ -34,10 +34,10 @@ from valve_friction_ros.identification.settings import (
     METHOD_NAMES,
     MOST_UNCERTAIN,
     STATED,
+    UNITS,
     IdentificationSettings,
     current_name,
 )
-from valve_friction_ros.identification.units import UNITS
 from valve_friction_ros.records.files import history_file
 
 ALARM_KINDS = (

@@ -48,7 +48,7 @@ from valve_friction_ros.identification.drawing import (
     IMPERFECTIONS_FOUND,
     friction_drawing,
 )
-from valve_friction_ros.identification.published.estimate import chosen_region
+from valve_friction_ros.identification.published.sweep import chosen_region
 from valve_friction_ros.model import (
     BENCH_VALVE,
     Drive,

@@ -31,7 +31,7 @@ from valve_friction_ros.identification import (
     Verdict,
     identify_bench,
 )
-from valve_friction_ros.identification.trust.misfit import Misfit
+from valve_friction_ros.identification.trust.verdict import Misfit
 from valve_friction_ros.model import BENCH_VALVE, Valve
 
 BASELINE = Baseline(128.0)

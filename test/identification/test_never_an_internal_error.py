@@ -69,26 +69,29 @@ SETTINGS = (
 )
 
 
-@cache
-def healthy(name):
-    """A record that one method or more identify."""
-    return HEALTHY[name]()
-
-
-def _triangle():
-    return simulated(TriangleWave().sample(np.arange(3000) / 20), 0.05)
-
-
 HEALTHY = {
-    "triangle": _triangle,
+    "triangle": lambda: simulated(TriangleWave().sample(np.arange(3000) / 20), 0.05),
     "quick": quick_record,
     "square": square_record,
     "stroked": stroked_record,
 }
 
 
-def _scaled(signal, random):
-    return signal * 10.0 ** random.integers(-12, 13)
+@cache
+def healthy(name):
+    """A record that one method or more identify."""
+    return HEALTHY[name]()
+
+
+def _from(signal, random):
+    """Return which samples come after a drawn one, and its value."""
+    begin = random.integers(signal.size)
+    return np.arange(signal.size) > begin, signal[begin]
+
+
+def _rounded(signal, random):
+    step = max(float(np.ptp(signal)), 1e-100) / random.choice([1, 2, 3, 20, 255])
+    return np.floor_divide(signal, step) * step
 
 
 def _spiked(signal, random):
@@ -97,64 +100,23 @@ def _spiked(signal, random):
     return damaged
 
 
-def _stepped(signal, random):
-    return signal + np.where(np.arange(signal.size) < random.integers(signal.size), 0.0, 1e5)
-
-
-def _frozen(signal, random):
-    begin = random.integers(signal.size)
-    return np.where(np.arange(signal.size) < begin, signal, signal[begin])
-
-
-def _thawed(signal, random):
-    begin = random.integers(signal.size)
-    return np.where(np.arange(signal.size) > begin, signal, signal[begin])
-
-
-def _held(signal, random):
-    return np.repeat(signal[:: random.integers(2, 60)], 60)[: signal.size]
-
-
-def _rounded(signal, random):
-    step = max(float(np.ptp(signal)), 1e-100) / random.choice([1, 2, 3, 20, 255])
-    return np.floor_divide(signal, step) * step
-
-
-def _noisy(signal, random):
-    return signal + random.choice([1e-6, 1.0, 1e3]) * random.standard_normal(signal.size)
-
-
-def _upside_down(signal, _):
-    return -signal
-
-
-def _constant(signal, random):
-    return np.full(signal.size, random.choice([signal[0], *EXTREMES]))
-
-
-def _sorted(signal, _):
-    return np.sort(signal)
-
-
-def _two_values(signal, random):
-    return random.choice([signal[0], signal[-1]], signal.size)
-
-
 rarely = st.sampled_from((*19 * (False,), True))
 
 DAMAGES = (
-    _scaled,
-    _spiked,
-    _stepped,
-    _frozen,
-    _thawed,
-    _held,
     _rounded,
-    _noisy,
-    _upside_down,
-    _constant,
-    _sorted,
-    _two_values,
+    _spiked,
+    lambda signal, random: signal * 10.0 ** random.integers(-12, 13),  # another unit
+    lambda signal, random: signal + np.where(_from(signal, random)[0], 0.0, 1e5),
+    lambda signal, random: np.where(*_from(signal, random), signal),  # frozen
+    lambda signal, random: np.where(_from(signal, random)[0], signal, signal[0]),
+    lambda signal, random: np.repeat(signal[:: random.integers(2, 60)], 60)[: signal.size],
+    lambda signal, random: (
+        signal + random.choice([1e-6, 1.0, 1e3]) * random.standard_normal(signal.size)
+    ),
+    lambda signal, random: np.full(signal.size, random.choice([signal[0], *EXTREMES])),
+    lambda signal, random: random.choice([signal[0], signal[-1]], signal.size),
+    lambda signal, _: -signal,
+    lambda signal, _: np.sort(signal),
 )
 
 

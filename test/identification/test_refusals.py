@@ -14,12 +14,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from records import assert_held
 
 from valve_friction_ros.identification import (
     METHODS,
     IdentificationSettings,
     RefusalError,
-    Verdict,
     identify_bench,
     identify_plant,
 )
@@ -77,12 +77,7 @@ def answered(recording, truth):
     """Identify with the default; each number that it gives holds its truth."""
     result = identify_plant(recording, BENCH_VALVE, SETTINGS)
     sliding = truth["coulomb_friction"] + truth["viscous_friction"] * result.sliding_speed
-    for name, true in {**truth, "sliding_friction": sliding}.items():
-        one = result.parameters[name]
-        if one.verdict is Verdict.NOT_IDENTIFIABLE:
-            assert abs(true) <= one.magnitude_bound, name
-        else:
-            assert abs(one.value - true) <= one.half_width, name
+    assert_held(result.parameters, {**truth, "sliding_friction": sliding})
     return result
 
 
@@ -115,11 +110,7 @@ def test_a_stem_that_does_not_move(healthy):
 
 def test_one_direction_only():
     record = recorded(np.linspace(70e3, 160e3, 26_000))
-    refused(
-        record,
-        r"^the stem moved only up \(.* mm up, .* mm down\).*one stroke in each "
-        r"direction",
-    )
+    refused(record, r"^the stem moved only up \(.* mm up, .* mm down\).*stroke in each direction")
 
 
 @pytest.mark.parametrize("rest", [20e3, 230e3], ids=["lower", "upper"])
@@ -203,12 +194,6 @@ def test_position_counted_the_wrong_way(healthy):
     refused(turned, r"^the stem moves against the pressure: invert the position")
 
 
-def test_a_record_that_is_too_short(healthy):
-    short = Recording(PERIOD, healthy.pressure[:30], healthy.position[:30])
-    with pytest.raises(RefusalError):
-        identify_bench(short, BENCH_VALVE, SETTINGS)
-
-
 VALVE = Valve(0.0445, travel=0.02)
 OPEN_ENDED = Valve(0.0445)
 
@@ -241,7 +226,6 @@ def test_ten_windows_are_enough():
 def test_a_gap_is_refused_in_its_own_words():
     require_unbroken(record([0.0, 1e-3]))
     broken = Recording(0.1, [0.0, 0.0], [0.0, 1e-3], gap="gap of 2 s: use another record")
-    assert refusal(require_unbroken, broken) == "gap of 2 s: use another record"
     assert refusal(require_unbroken, measured(broken)) == "gap of 2 s: use another record"
 
 
@@ -261,16 +245,10 @@ def test_motion_is_ten_times_the_noise(share, moves):
     if moves:
         require_motion(record(position))
     else:
-        assert refusal(require_motion, record(position)) == (
+        assert refusal(require_motion, record(position)).startswith(
             f"the stem did not move: its position spans {span * 1e6:.3g} µm with "
-            f"{position_noise(noise) * 1e6:.3g} µm of noise; move the valve over several percent "
-            "of its travel"
+            f"{position_noise(noise) * 1e6:.3g} µm of noise; "
         )
-
-
-def test_a_stem_at_rest_did_not_move():
-    assert "did not move: its position spans 0 µm" in refusal(require_motion, record([0.01] * 9))
-    require_motion(record(np.linspace(0.0, 1e-9, 50)))
 
 
 @pytest.mark.parametrize("window", [1, 10])
@@ -279,12 +257,7 @@ def test_a_fiftieth_of_the_way_goes_back(window, sign):
     """Averages over the window make each way a window's step shorter at most."""
     require_two_directions(record(sign * triangle(0.97, 0.03)), window)
     text = refusal(require_two_directions, record(sign * triangle(0.985, 0.015)), window)
-    way = "up" if sign > 0 else "down"
-    assert text.startswith(f"the stem moved only {way} (")
-    assert text.endswith(
-        " mm down): friction and spring cannot be separated; record at least one stroke in each "
-        "direction"
-    )
+    assert text.startswith(f"the stem moved only {'up' if sign > 0 else 'down'} (")
 
 
 def test_a_way_back_that_may_be_elastic_is_none():
@@ -326,10 +299,6 @@ def test_the_stem_stays_within_a_twentieth_and_moves_a_hundredth(lowest, highest
 
 
 def test_what_is_said_of_the_travel():
-    assert refusal(require_travel, record([0.001, 0.05]), VALVE) == (
-        "the stem position runs from 0.001 to 0.05 m, but the travel is 0 to 0.02 m: check that "
-        "the signals are not swapped, and check unit (m), zero and travel"
-    )
     assert refusal(require_travel, record([0.01, 0.0100999]), VALVE) == (
         "too little travel: the stem moved 0.0999 mm, 0.5 % of its travel; move it over several "
         "percent of the travel"
@@ -371,23 +340,6 @@ def test_a_twentieth_of_the_top_speed_is_motion(share, counts):
     assert (found[:2] != pytest.approx(_followed(clean)[:2], rel=1e-9)) is counts
 
 
-def test_pressure_that_does_not_change():
-    position = strokes().position
-    assert refusal(require_related_signals, record(position, np.full(301, 1e5))) == (
-        "the pressure did not change: move the valve, or check the pressure sensor"
-    )
-    assert _followed(record(position, np.full(301, 1e5)))[1] == 0.0
-
-
-def test_unrelated_signals():
-    assert refusal(require_related_signals, strokes(scatter=1e6)) == (
-        "pressure and stem do not move together (position and direction of the moving stem "
-        f"explain {100 * _followed(strokes(scatter=1e6))[1]:.0f} % of the pressure): check that "
-        "both signals belong to this valve, are not swapped, come from working sensors, and that "
-        "they share one clock"
-    )
-
-
 def strokes_explaining(share, slope=2e6):
     """Strokes with as much scatter as leaves this share of the pressure explained."""
     scatter = 1e4
@@ -398,24 +350,15 @@ def strokes_explaining(share, slope=2e6):
     return strokes(scatter, slope)
 
 
-@pytest.mark.parametrize(("share", "passes"), [(0.12, True), (0.08, False)])
-def test_a_tenth_of_the_pressure_must_be_explained(share, passes):
-    if passes:
-        require_related_signals(strokes_explaining(share))
-    else:
-        refusal(require_related_signals, strokes_explaining(share))
+def test_a_tenth_of_the_pressure_must_be_explained():
+    require_related_signals(strokes_explaining(0.12))
+    text = refusal(require_related_signals, strokes_explaining(0.08))
+    assert "direction of the moving stem explain 8 % of the pressure" in text
 
 
 def turned_over(upright):
     """The same with a position that grows the other way."""
     return record(0.02 - upright.position, upright.pressure)
-
-
-def test_a_stem_against_the_pressure():
-    assert refusal(require_related_signals, turned_over(strokes())) == (
-        "the stem moves against the pressure: invert the position (for a file: inverted_position) "
-        "so that it increases in the direction in which pressure pushes the stem"
-    )
 
 
 def test_no_position_is_inverted_whose_loop_dissipates():
@@ -432,13 +375,10 @@ def test_a_mass_that_swings_against_the_pressure_dissipates(frequency):
     assert not _followed(turned_over(swinging)).dissipates
 
 
-@pytest.mark.parametrize(("share", "passes"), [(0.48, True), (0.52, False)])
-def test_where_less_than_half_is_explained_the_sign_is_chance(share, passes):
-    turned = turned_over(strokes_explaining(share))
-    if passes:
-        require_related_signals(turned)
-    else:
-        assert "moves against the pressure" in refusal(require_related_signals, turned)
+def test_where_less_than_half_is_explained_the_sign_is_chance():
+    require_related_signals(turned_over(strokes_explaining(0.48)))
+    turned = turned_over(strokes_explaining(0.52))
+    assert "moves against the pressure" in refusal(require_related_signals, turned)
 
 
 def test_the_jumps_of_a_stem_that_sticks_are_no_slow_sampling():

@@ -72,3 +72,13 @@ def sine_record(parameters, duration=16.0):
     pressure = SineWave(period=4.0).sample(np.arange(round(100 * duration)) / 100)
     position = simulate(BENCH_VALVE, parameters, pressure, 0.01).position
     return Recording(0.01, pressure, position)
+
+
+def assert_held(numbers, truth):
+    """Each true number lies in its interval, or below its bound where the value is withheld."""
+    for name, true in truth.items():
+        one = numbers[name]
+        if np.isnan(one.value):
+            assert abs(true) <= one.magnitude_bound, name
+        else:
+            assert abs(one.value - true) <= one.half_width, name

@@ -24,7 +24,7 @@ from valve_friction_ros.identification import (
     plain,
     validate,
 )
-from valve_friction_ros.identification.trust.misfit import LEAST_FIT
+from valve_friction_ros.identification.trust.verdict import LEAST_FIT
 from valve_friction_ros.model import Valve
 from valve_friction_ros.outside_text import printable
 from valve_friction_ros.wording import percentage

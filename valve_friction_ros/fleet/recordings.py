@@ -21,7 +21,7 @@ from types import MappingProxyType
 from valve_friction_ros.health import Baseline, Measured, SlidingFriction
 from valve_friction_ros.health.valve_numbers import COMPARED, IDENTIFIED_ONLY, fit_numbers
 from valve_friction_ros.identification import Verdict
-from valve_friction_ros.identification.units import column_suffix
+from valve_friction_ros.identification.settings import column_suffix
 from valve_friction_ros.outside_text import as_read
 from valve_friction_ros.records.files import (
     cause_of,

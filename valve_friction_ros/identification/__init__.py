@@ -18,13 +18,10 @@ if TYPE_CHECKING:
         IMPERFECTIONS_FOUND as IMPERFECTIONS_FOUND,
         Curve as Curve,
         Drawing as Drawing,
-        Exhibit as Exhibit,
         Panel as Panel,
     )
-    from valve_friction_ros.identification.engine.expectation import (
-        expected_half_widths as expected_half_widths,
-    )
     from valve_friction_ros.identification.engine.method import (
+        expected_half_widths as expected_half_widths,
         identify_bench as identify_bench,
         identify_plant as identify_plant,
     )
@@ -34,22 +31,16 @@ if TYPE_CHECKING:
         identify as identify,
         method_named as method_named,
     )
-    from valve_friction_ros.identification.published.estimate import (
-        Estimate as Estimate,
-    )
     from valve_friction_ros.identification.published.identify import (
+        identify_published as identify_published,
         published_estimate as published_estimate,
     )
-    from valve_friction_ros.identification.published.method import (
-        identify_published as identify_published,
-    )
     from valve_friction_ros.identification.published.sweep import (
+        Estimate as Estimate,
         Sweep as Sweep,
         sweep_thresholds as sweep_thresholds,
     )
-    from valve_friction_ros.identification.refusal import (
-        RefusalError as RefusalError,
-    )
+    from valve_friction_ros.identification.refusal import RefusalError as RefusalError
     from valve_friction_ros.identification.rendering import (
         parameter_cells as parameter_cells,
         parameter_columns as parameter_columns,
@@ -67,19 +58,20 @@ if TYPE_CHECKING:
         FORMER_METHODS as FORMER_METHODS,
         METHOD_NAMES as METHOD_NAMES,
         MOST_UNCERTAIN as MOST_UNCERTAIN,
+        PARAMETER_UNITS as PARAMETER_UNITS,
+        SLIDING as SLIDING,
         STATED as STATED,
         TIMING_UNCERTAINTY as TIMING_UNCERTAINTY,
+        UNITS as UNITS,
         IdentificationSettings as IdentificationSettings,
         current_name as current_name,
     )
     from valve_friction_ros.identification.signature.force_balance import (
         identify_signature as identify_signature,
     )
-    from valve_friction_ros.identification.signature.strokes import (
+    from valve_friction_ros.identification.signature.valve_signature import (
         BreakawayPoint as BreakawayPoint,
         SignatureStroke as SignatureStroke,
-    )
-    from valve_friction_ros.identification.signature.valve_signature import (
         ValveSignature as ValveSignature,
         valve_signature as valve_signature,
     )
@@ -96,10 +88,6 @@ if TYPE_CHECKING:
         identified_model as identified_model,
         validate as validate,
     )
-    from valve_friction_ros.identification.trust.misfit import (
-        LEAST_FIT as LEAST_FIT,
-        Misfit as Misfit,
-    )
     from valve_friction_ros.identification.trust.plausible_units import (
         require_valve_units as require_valve_units,
     )
@@ -108,14 +96,10 @@ if TYPE_CHECKING:
         SPEED_EXPONENT as SPEED_EXPONENT,
     )
     from valve_friction_ros.identification.trust.verdict import (
+        LEAST_FIT as LEAST_FIT,
+        Misfit as Misfit,
         Parameter as Parameter,
         Verdict as Verdict,
-    )
-    from valve_friction_ros.identification.units import (
-        CLOCK_OFFSET as CLOCK_OFFSET,
-        PARAMETER_UNITS as PARAMETER_UNITS,
-        SLIDING as SLIDING,
-        UNITS as UNITS,
     )
     from valve_friction_ros.wording import (
         percentage as percentage,

@@ -12,15 +12,15 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from valve_friction_ros.identification.settings import SLIDING
 from valve_friction_ros.identification.trust.uncertainty import NORMAL_QUANTILE
 from valve_friction_ros.identification.trust.verdict import Parameter
-from valve_friction_ros.identification.units import SLIDING
-from valve_friction_ros.model.valve import KarnoppParameters, Valve
+from valve_friction_ros.model.valve import KarnoppParameters
 from valve_friction_ros.wording import with_width
 
 
@@ -127,13 +127,6 @@ class Drawing:
     settings: Mapping[str, str] | None = None
 
 
-class Exhibit(Protocol):
-    """The evidence of a method, such as a sweep or a valve signature."""
-
-    def drawing(self, parameters: Mapping[str, Parameter], valve: Valve) -> Drawing:
-        """Return the drawing of this evidence, with these parameters of the result."""
-
-
 FRICTION_CURVE = "friction_curve"
 """Name of the evidence that holds friction over speed, SI units (`FrictionCurve`)."""
 
@@ -157,18 +150,9 @@ def friction_drawing(
 ) -> Drawing:
     """Return a drawing with friction over speed in place of its own panels.
 
-    Parameters
-    ----------
-    drawing : Drawing
-        The other curves and panels of the result.
-    evidence : mapping of str to object
-        Evidence of the result: the friction curve, which may be empty, and the lag of the fit.
-    parameters : mapping of str to Parameter
-        Parameters of the result: the fitted law, with its band.
-    model : KarnoppParameters or None
-        Model of the simulation, for values that the record does not determine.
-    sliding_speed : float
-        Speed at which the sliding friction holds, m/s.
+    The `evidence` holds the friction curve, which may be empty, and the lag of the fit; the
+    `parameters` give the fitted law, with its band, and the `model` what the record does not
+    determine. The sliding friction holds at the `sliding_speed`, m/s.
     """
     curve = evidence[FRICTION_CURVE]
     if not curve:

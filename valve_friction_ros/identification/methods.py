@@ -15,9 +15,9 @@ from typing import Protocol
 
 import numpy as np
 
-from valve_friction_ros.identification.engine.imperfections import Profile
+from valve_friction_ros.identification.engine.coordinates import Profile
 from valve_friction_ros.identification.engine.method import identify_bench, identify_plant
-from valve_friction_ros.identification.published import method as published
+from valve_friction_ros.identification.published import identify as published
 from valve_friction_ros.identification.result import Result
 from valve_friction_ros.identification.settings import (
     DEFAULT_METHOD,

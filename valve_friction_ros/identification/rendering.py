@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from valve_friction_ros.identification.settings import column_suffix
 from valve_friction_ros.identification.trust.verdict import Parameter, Verdict
-from valve_friction_ros.identification.units import column_suffix
 from valve_friction_ros.wording import two_digits
 
 if TYPE_CHECKING:
@@ -59,19 +59,9 @@ def parameter_mapping(parameter: Parameter) -> dict[str, Any]:
 
 
 def parameter_columns(name: str, shown: Mapping[str, Any] | None) -> dict[str, Any]:
-    """Return a parameter as columns of a table, with the unit in their names.
+    """Return value, standard error, half width and verdict of a parameter, as columns of a table.
 
-    Parameters
-    ----------
-    name : str
-        Name of the parameter.
-    shown : mapping of str to object, or None
-        Its `parameter_mapping`; None leaves the cells empty.
-
-    Returns
-    -------
-    dict of str to float, str or None
-        Value, standard error, half width and verdict.
+    Their names hold the unit. Where there is no `parameter_mapping`, None, the cells are empty.
     """
     cells = {} if shown is None else shown
     unit = column_suffix(name)

@@ -12,6 +12,7 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
+from enum import Enum
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -22,26 +23,113 @@ from valve_friction_ros.identification.drawing import (
     FRICTION_CURVE,
     IMPERFECTIONS_FOUND,
     Drawing,
-    Exhibit,
     friction_drawing,
 )
-from valve_friction_ros.identification.published.estimate import Estimate
+from valve_friction_ros.identification.published.sweep import Estimate
 from valve_friction_ros.identification.refusal import RefusalError
-from valve_friction_ros.identification.settings import IdentificationSettings
+from valve_friction_ros.identification.settings import SLIDING, IdentificationSettings
 from valve_friction_ros.identification.signature.valve_signature import ValveSignature
-from valve_friction_ros.identification.trust.misfit import Misfit
-from valve_friction_ros.identification.trust.model_comparison import (
-    ModelComparison,
-    models_compared,
-)
 from valve_friction_ros.identification.trust.stated import CONTRADICTED, with_stated
 from valve_friction_ros.identification.trust.uncertainty import CORRELATION
-from valve_friction_ros.identification.trust.verdict import Parameter, with_calibration
-from valve_friction_ros.identification.units import SLIDING
+from valve_friction_ros.identification.trust.verdict import Misfit, Parameter, with_calibration
 from valve_friction_ros.model.checks import frozen
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.simulation import simulate
 from valve_friction_ros.model.valve import KarnoppParameters, Valve
+from valve_friction_ros.wording import evidence_ratio_words
+
+
+class Support(Enum):
+    """How strongly a record favours one of two models, after Kass and Raftery (1995)."""
+
+    HARDLY = 1.0
+    POSITIVE = 3.0
+    STRONG = 20.0
+    VERY_STRONG = 150.0
+
+    @classmethod
+    def of(cls, log_ratio: float) -> "Support":
+        """Return the strongest support whose ratio, its value, is reached in either direction."""
+        return max(
+            (one for one in cls if abs(log_ratio) >= math.log(one.value)), key=lambda one: one.value
+        )
+
+
+@dataclass(frozen=True)
+class ModelComparison:
+    """Two models of one record.
+
+    Attributes
+    ----------
+    log_ratio : float
+        Natural logarithm of the evidence for the first over that for the second.
+    rms : tuple of float
+        Root mean square residual of the stem under each model, m.
+    free : tuple of int
+        Free parameters of each.
+    samples, independent : float
+        Samples of the stem, and the equivalent number of independent samples.
+    describes : tuple of bool
+        Whether the residual of each model is no more than noise.
+    """
+
+    log_ratio: float
+    rms: tuple[float, float]
+    free: tuple[int, int]
+    samples: float
+    independent: float
+    describes: tuple[bool, bool] = (True, True)
+
+    @property
+    def support(self) -> Support:
+        """How strongly the record favours one of the models."""
+        return Support.of(self.log_ratio)
+
+    def __str__(self) -> str:
+        """Return the comparison in words."""
+        return evidence_ratio_words(
+            self.support.name, self.log_ratio, self.samples, self.independent, self.describes
+        )
+
+
+def independent_samples(residual: NDArray[np.float64]) -> float:
+    """Return the number of independent samples that an autocorrelated residual is worth.
+
+    The autocorrelation is summed up to the lag at which a pair of neighbours is negative (Geyer's
+    initial positive sequence).
+    """
+    size, shares = residual.size, _autocorrelation(residual)
+    if not shares[0] > 0:
+        return float(size)
+    pairs = shares[: size // 2 * 2].reshape(-1, 2).sum(axis=1)
+    negative = np.flatnonzero(pairs < 0)
+    pairs = pairs[: negative[0]] if negative.size else pairs
+    return float(np.clip(size / max(2.0 * float(np.sum(pairs)) - 1.0, 1.0), 1.0, size))
+
+
+def models_compared(
+    residuals: tuple[NDArray[np.float64], NDArray[np.float64]],
+    free: tuple[int, int],
+    describes: tuple[bool, bool] = (True, True),
+) -> ModelComparison:
+    """Compare two models by their residuals, m, on the same samples of the stem.
+
+    The evidence is Schwarz's: −n/2·ln(mean square) − p/2·ln n, with n independent samples and p
+    free parameters. The residual of a model is autocorrelated, so n is the number of samples over
+    the sum of its autocorrelation at all lags, for the model with the smaller n. That is rough: the
+    two stems differ in few places, and the ratio of two wrong models says which is nearer, not
+    which is true.
+    """
+    samples = float(residuals[0].size)
+    independent = min(map(independent_samples, residuals))
+    squares = [float(np.mean(one**2)) for one in residuals]
+    least = np.finfo(float).tiny
+    fits = [-0.5 * independent * math.log(max(one, least)) for one in squares]
+    costs = [0.5 * count * math.log(independent) for count in free]
+    log_ratio = (fits[0] - costs[0]) - (fits[1] - costs[1])
+    rms = math.sqrt(squares[0]), math.sqrt(squares[1])
+    return ModelComparison(log_ratio, rms, free, samples, independent, describes)
+
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -89,16 +177,16 @@ class StemComparison(NamedTuple):
         return self.simulated - self.measured
 
     def autocorrelation(self, lags: int) -> NDArray[np.float64]:
-        """Return the autocorrelation of the residual at lags of 0 … `lags` − 1 samples.
+        """Return the autocorrelation of the residual at lags of 0 … `lags` − 1 samples."""
+        return _autocorrelation(self.residual)[:lags]
 
-        It is 1 at lag 0; a residual of zeros gives 0 at every lag.
-        """
-        residual = self.residual - self.residual.mean()
-        size = 2 * residual.size
-        spectrum = np.abs(np.fft.rfft(residual, size)) ** 2
-        products = np.fft.irfft(spectrum, size)[:lags]
-        power = float(products[0])
-        return np.asarray(products / (power or 1.0), dtype=np.float64)
+
+def _autocorrelation(residual: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the autocorrelation at each lag: 1 at lag 0; a residual of zeros has 0 everywhere."""
+    centred = residual - residual.mean()
+    spectrum = np.abs(np.fft.rfft(centred, 2 * centred.size)) ** 2
+    products = np.fft.irfft(spectrum, 2 * centred.size)[: centred.size]
+    return np.asarray(products / (float(products[0]) or 1.0), dtype=np.float64)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -137,7 +225,7 @@ class Result:
         The evidence in words, one sentence each.
     model : KarnoppParameters or None
         The identified model, to simulate; None where a value is impossible.
-    exhibit : Exhibit or None
+    exhibit : Estimate, ValveSignature or None
         Evidence drawn beside record and stem, such as a sweep or a valve signature.
     stem : StemComparison or None
         Measured and simulated stem; None where no stem is simulated.
@@ -176,7 +264,7 @@ class Result:
     evidence: Mapping[str, object] = field(default_factory=dict, repr=False)
     findings: tuple[str, ...] = field(default=(), repr=False)
     model: KarnoppParameters | None = field(default=None, repr=False)
-    exhibit: Exhibit | None = field(default=None, repr=False)
+    exhibit: Estimate | ValveSignature | None = field(default=None, repr=False)
     stem: StemComparison | None = field(default=None, repr=False)
     sliding_speed: float = math.nan
     stated_by: IdentificationSettings | None = field(default=None, repr=False, compare=False)
@@ -281,22 +369,6 @@ class Result:
             If one of the two simulated no stem.
         ValueError
             If they are of different records.
-
-        Examples
-        --------
-        >>> import numpy as np
-        >>> import valve_friction_ros as vf
-        >>> valve = vf.Valve(diaphragm_area=0.0445, travel=28.575e-3)
-        >>> packing = vf.KarnoppParameters(1.6, 4865.0, 150.0, 150.0, 2.05e5)
-        >>> pressure = 6.5e4 + 5e4 * np.sin(2 * np.pi * np.arange(4000) / 1000)
-        >>> stem = vf.simulate(valve, packing, pressure, sample_period=0.01)
-        >>> noise = vf.SensorNoise(position=5e-6, seed=1)
-        >>> record = noise.applied_to(vf.Recording(0.01, pressure, stem.position))
-        >>> whole = vf.identify(record, valve, "bench")
-        >>> dry = vf.IdentificationSettings(fixed={"viscous_friction": 0.0})
-        >>> compared = whole.against(vf.identify(record, valve, dry, "bench"))
-        >>> compared.support.name
-        'VERY_STRONG'
         """
         mine, others = self.stem, other.stem
         if mine is None or others is None:
@@ -464,13 +536,7 @@ class Result:
         return rendering.html_of(self.to_dict())
 
     def to_frame(self) -> "pd.DataFrame":
-        """Return the parameters as a pandas frame, one row per parameter.
-
-        Raises
-        ------
-        ImportError
-            If pandas is not installed.
-        """
+        """Return the parameters as a pandas frame, one row per parameter."""
         return rendering.frame_of(self.to_dict())
 
     def plot(self) -> "Figure":

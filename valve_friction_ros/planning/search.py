@@ -27,9 +27,9 @@ from valve_friction_ros.identification import (
     expected_half_widths,
     percentage,
 )
+from valve_friction_ros.identification.settings import SLIDING
 from valve_friction_ros.identification.trust.sliding import mean_sliding_friction
 from valve_friction_ros.identification.trust.verdict import FALL_SPEED
-from valve_friction_ros.identification.units import SLIDING
 from valve_friction_ros.model.excitations import Excitation
 from valve_friction_ros.model.recording import Recording, SensorNoise, converter_response
 from valve_friction_ros.model.simulation import Trajectory, simulate

@@ -28,7 +28,7 @@ from valve_friction_ros.figures.record_figures import (
 from valve_friction_ros.history import ValveHistory, drift_text
 from valve_friction_ros.history.trend import DAY
 from valve_friction_ros.identification import StemComparison
-from valve_friction_ros.identification.trust.misfit import Misfit
+from valve_friction_ros.identification.trust.verdict import Misfit
 from valve_friction_ros.model import Valve
 from valve_friction_ros.reports.identification_tables import (
     budget_table,

@@ -14,8 +14,6 @@ event lies between the two simulations of a difference, no difference is a deriv
 are the cells in which those of two steps agree.
 """
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -239,15 +237,3 @@ class TestSensitivity:
         at = {**TRUTH, "start_position": model.record.start, "slip_force": 0.0}
         found = model.sensitivity(at, ("coulomb_friction", "slip_force"), model.readings(at))
         assert np.abs(found[:, 1]).max() > 0.1
-
-    @pytest.mark.parametrize("speed", [0.0, 3e-3])
-    def test_coarse_ones_are_differences(self, model, speed):
-        names = ("coulomb_friction", "spring_constant")
-        at = {**TRUTH, "start_position": model.record.start, "stribeck_velocity": speed}
-        coarse = replace(model, coarseness=100.0)
-        readings, centre = coarse.readings(at), straight(at, names)
-        found = coarse.sensitivity(at, names, readings)
-        for row, name in enumerate(names):
-            step = coarse.step(at, name)
-            higher = coarse.readings(physical({**centre, name: centre[name] + step}, names))
-            assert found[:, row] == pytest.approx((higher - readings) / step, abs=1e-12)

@@ -7,8 +7,9 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The published method: its threshold, its mass, its warnings, and what it states of each."""
+"""The published method: what it identifies on bench records, what it states, and its refusals."""
 
+import dataclasses
 import math
 from dataclasses import replace
 
@@ -16,6 +17,7 @@ import numpy as np
 import pytest
 
 from valve_friction_ros.identification import (
+    FIXABLE,
     UNITS,
     IdentificationSettings,
     Parameter,
@@ -25,31 +27,35 @@ from valve_friction_ros.identification import (
     sweep_thresholds,
 )
 from valve_friction_ros.identification.published import identify
-from valve_friction_ros.identification.published.estimate import possible_model
 from valve_friction_ros.identification.published.identify import (
     Breakaway,
-    _mass_by_shorter_window,
     _why_mass_is_unknown,
     choose_threshold,
-)
-from valve_friction_ros.identification.published.method import (
     identify_published,
     sweep_evidence,
     sweep_finding,
     with_published,
 )
-from valve_friction_ros.identification.published.sweep import Sweep, force_balance_regression
+from valve_friction_ros.identification.published.sweep import (
+    Sweep,
+    force_balance_regression,
+    possible_model,
+)
 from valve_friction_ros.model import (
     BENCH_VALVE,
     HIGH_FRICTION,
     LOW_FRICTION,
+    IsaSteps,
     KarnoppParameters,
     Recording,
     SensorNoise,
     SineWave,
     SquareWave,
+    Valve,
+    converter_response,
+    simulate,
 )
-from valve_friction_ros.signals import differentiate, measured
+from valve_friction_ros.signals import differentiate
 
 SPRING = HIGH_FRICTION.spring_constant
 SETTINGS = IdentificationSettings(
@@ -175,31 +181,6 @@ def test_a_mass_keeps_within_a_quarter(mass, other, reason):
     assert _why_mass_is_unknown(mass, other) == reason
 
 
-@pytest.mark.parametrize(
-    ("window", "order", "half"), [(31, 3, 15), (33, 3, 17), (5, 3, 5), (7, 4, 7), (11, 4, 7)]
-)
-def test_mass_with_half_the_window(bench_record, window, order, half):
-    """By `lstsq` above the threshold: half the window, odd, order + 2 samples at least."""
-    record = measured(bench_record("high", SineWave(), 20.0, SensorNoise(10e-6, 100.0, 0)))
-    settings = IdentificationSettings(derivative_window=window, order=order)
-    force = BENCH_VALVE.actuator_force(record.pressure)
-    threshold = 2e-3
-    found = _mass_by_shorter_window(record, force, settings, threshold)
-    velocity, acceleration, margin = differentiate(record.position, 1e-3, half, order)
-    moving = np.abs(velocity) > threshold
-    columns = [acceleration, np.sign(velocity), velocity, record.position[margin:-margin]]
-    table = np.column_stack([*columns, np.ones(velocity.size)])[moving]
-    lengths = np.linalg.norm(table, axis=0)
-    solved = np.linalg.lstsq(table / lengths, force[margin:-margin][moving], rcond=None)[0]
-    assert found == pytest.approx(solved[0] / lengths[0], rel=1e-6)
-
-
-def test_no_mass_where_nothing_is_faster(bench_record):
-    record = measured(bench_record("high", SineWave(), 20.0))
-    force = BENCH_VALVE.actuator_force(record.pressure)
-    assert np.isnan(_mass_by_shorter_window(record, force, IdentificationSettings(), 1.0))
-
-
 VALUES = {"coulomb_friction": 3.0, "spring_constant": 10.0, "spring_preload": 1.0}
 
 
@@ -218,23 +199,19 @@ def static_friction(monkeypatch):
     return found
 
 
-class TestStaticFriction:
+def test_static_friction_is_the_median_pull_and_not_below_the_coulomb_friction(static_friction):
     """Pulls less spring and preload: 9, 9, 9, −21 and 49 N."""
+    assert static_friction(Breakaway(1, 1), Breakaway(3, -1), Breakaway(4, 1)) == (21.0, [])
+    assert static_friction(Breakaway(1, -1)) == (3.0, [])
+    assert static_friction(Breakaway(1, 1), coulomb_friction=9.5) == (9.5, [])
 
-    def test_is_the_median(self, static_friction):
-        assert static_friction(Breakaway(1, 1)) == (9.0, [])
-        assert static_friction(Breakaway(1, 1), Breakaway(3, -1), Breakaway(4, 1)) == (21.0, [])
 
-    def test_is_not_below_the_coulomb_friction(self, static_friction):
-        assert static_friction(Breakaway(1, -1)) == (3.0, [])
-        assert static_friction(Breakaway(1, 1), coulomb_friction=9.5) == (9.5, [])
-
-    def test_without_a_breakaway_it_is_the_coulomb_friction(self, static_friction):
-        value, (warning,) = static_friction()
-        assert value == 3.0
-        assert warning == (
-            "the record contains no breakaway from rest: static_friction is set to coulomb_friction"
-        )
+def test_without_a_breakaway_static_is_coulomb_friction(static_friction):
+    value, (warning,) = static_friction()
+    assert value == 3.0
+    assert warning == (
+        "the record contains no breakaway from rest: static_friction is set to coulomb_friction"
+    )
 
 
 def test_negative_values_but_for_a_preload(bench_record):
@@ -272,13 +249,6 @@ def test_a_given_static_friction_below_the_coulomb_friction(bench_record, share)
     assert estimate.warnings == ((expected,) if share < 1 else ())
 
 
-def test_a_static_friction_that_equals_the_coulomb_friction(bench_record):
-    fixed = {"static_friction": 150.0, "coulomb_friction": 150.0}
-    settings = IdentificationSettings(fixed=fixed)
-    estimate = published_estimate(bench_record("low", SineWave(), 71.0), BENCH_VALVE, settings)
-    assert not any("lies below" in warning for warning in estimate.warnings)
-
-
 WINDOW = 31
 
 
@@ -300,14 +270,6 @@ def noisy(request, bench_record):
     """High friction, 10 µm and 100 Pa of noise, the paper's form with the true bias."""
     noise = SensorNoise(position=10e-6, pressure=100.0, seed=request.param)
     return swept(bench_record("high", SquareWave(), 52.0, noise), position_bias=1.13e-3)
-
-
-def test_smallest_sigma_is_far_off(noisy):
-    """What the rule is there to avoid: 11 to 100 samples of one speed fit anything."""
-    smallest = int(np.nanargmin(noisy.sigma))
-    assert noisy.samples[smallest] < 0.01 * noisy.samples[0]
-    assert error(noisy, smallest, "coulomb_friction") > 0.3
-    assert error(noisy, smallest, "viscous_friction") > 0.5
 
 
 def test_chosen_threshold_is_on_the_plateau(noisy):
@@ -332,26 +294,6 @@ def test_smallest_generalised_variance(noisy):
     assert choose_threshold(noisy, WINDOW) == np.argmin(np.where(usable, criterion, np.inf))
 
 
-def test_the_unit_of_force_does_not_matter(bench_record):
-    """Nor does that of length: the determinant changes by the same factor at each step."""
-    noise = SensorNoise(position=10e-6, pressure=100.0, seed=0)
-    record = bench_record("high", SquareWave(), 20.8, noise)
-    derivatives = differentiate(record.position, record.sample_period)
-    force = BENCH_VALVE.actuator_force(record.pressure)
-    settings = IdentificationSettings()
-    chosen = []
-    for newton, metre in ((1.0, 1.0), (1e-3, 1.0), (1.0, 1e3)):
-        scaled = derivatives._replace(
-            velocity=derivatives.velocity * metre, acceleration=derivatives.acceleration * metre
-        )
-        regression = force_balance_regression(
-            force * newton, record.position * metre, scaled, settings
-        )
-        thresholds = regression.speed.max() / 350 * np.arange(1, 331)
-        chosen.append(choose_threshold(sweep_thresholds(regression, thresholds), WINDOW))
-    assert chosen[0] == chosen[1] == chosen[2]
-
-
 def test_refuses_where_no_step_has_enough_samples(bench_record):
     record = bench_record("high", SquareWave(), 20.8)
     sweep = swept(record)
@@ -365,40 +307,229 @@ def test_refuses_where_no_step_has_enough_samples(bench_record):
     choose_threshold(sweep, longer - 1)
 
 
-def one_parameter(sigma, log_information):
-    """A sweep of three thresholds with 40 samples each; the third is unknown."""
-    steps, unknown = np.arange(1.0, 4.0), np.full(3, np.nan)
-    return Sweep(
-        steps,
-        {"mass": unknown},
-        np.array([*sigma, np.nan]),
-        unknown,
-        np.full(3, 40),
-        np.array([*log_information, np.nan]),
-        1,
-    )
-
-
-@pytest.mark.parametrize(
-    ("sigma", "log_information", "chosen"),
-    [
-        ((1.0, 1.0), (0.0, 0.1), 1),
-        ((1.0, 1.2), (0.0, 0.1), 0),  # 2·ln 1.2 is 0.36
-        ((1.0, 1.2), (0.0, 0.4), 1),
-        ((0.0, 0.0), (0.0, 0.1), 1),
-        ((0.0, 0.0), (0.1, 0.0), 0),
-    ],
-)
-def test_residual_against_information(sigma, log_information, chosen):
-    assert choose_threshold(one_parameter(sigma, log_information), 31) == chosen
-
-
 @pytest.mark.parametrize(("residual", "chosen"), [(0.8e-11, 0), (1.2e-11, 1)])
 def test_a_residual_below_rounding_is_none(residual, chosen):
     """10⁻¹² of the largest, 10 N: what is smaller does not count, and the information decides."""
-    sweep = replace(
-        one_parameter((1.0, 1.0), (0.0, 0.0)),
-        sigma=np.array([residual, 0.5e-11, 10.0]),
-        log_information=np.array([0.1, 0.0, 0.0]),
-    )
+    unknown, sigma = np.full(3, np.nan), np.array([residual, 0.5e-11, 10.0])
+    information = np.array([0.1, 0.0, 0.0])
+    sweep = Sweep(np.arange(3.0), {"mass": unknown}, sigma, unknown, np.full(3, 40), information, 1)
     assert choose_threshold(sweep, 31) == chosen
+
+
+FOUR_COLUMNS = IdentificationSettings(position_bias=1.13e-3)
+NOISE = SensorNoise(position=10e-6, pressure=100.0, seed=0)
+
+
+def assert_identified(estimate, true, tolerances):
+    for name, tolerance in tolerances.items():
+        value, expected = getattr(estimate, name), getattr(true, name)
+        assert value == pytest.approx(expected, rel=tolerance), name
+
+
+# What is asked of noise-free records. The mass is smoothed by the 31 ms window of the derivatives.
+NOISE_FREE = {
+    "viscous_friction": 1e-3,
+    "coulomb_friction": 1e-3,
+    "spring_constant": 1e-3,
+    "mass": 0.1,
+}
+
+
+@pytest.mark.parametrize("name", ["low", "high"])
+class TestNoiseFree:
+    @pytest.mark.parametrize("duration", [20.8, 52.0])
+    def test_square_wave_in_the_four_column_form(self, benches, bench_record, name, duration):
+        """The paper's experiment: two periods and more, bias from (16)."""
+        estimate = published_estimate(
+            bench_record(name, SquareWave(), duration), BENCH_VALVE, FOUR_COLUMNS
+        )
+        assert_identified(estimate, benches[name].parameters, NOISE_FREE)
+        assert estimate.spring_preload == estimate.spring_constant * 1.13e-3
+        assert estimate.fixed == ()
+        assert estimate.warnings == ()
+
+    @pytest.mark.parametrize(
+        ("excitation", "duration"), [(SineWave(), 71.0), (IsaSteps(), 370.0)], ids=["sine", "isa"]
+    )
+    def test_preload_as_a_regressor(self, benches, bench_record, name, excitation, duration):
+        estimate = published_estimate(bench_record(name, excitation, duration), BENCH_VALVE)
+        tolerances = NOISE_FREE | {"spring_preload": 1e-3}
+        assert_identified(estimate, benches[name].parameters, tolerances)
+        assert estimate.fixed == ()
+        assert estimate.warnings == ()
+
+    def test_square_wave_does_not_tell_the_mass(self, benches, bench_record, name):
+        """Two exponentials and a level each way: four equations for five parameters."""
+        record = bench_record(name, SquareWave(), 20.8)
+        estimate = published_estimate(record, BENCH_VALVE, IdentificationSettings(assumed_mass=1.6))
+        assert estimate.mass == 1.6
+        assert estimate.fixed == ("mass",)
+        assert estimate.settings.fixed == {"mass": 1.6}
+        (warning,) = estimate.warnings
+        assert warning.startswith("the record does not determine the mass")
+        assert warning.endswith("1.6 kg is assumed")
+        assert_identified(
+            estimate,
+            benches[name].parameters,
+            {"coulomb_friction": 1e-3, "spring_constant": 1e-3, "viscous_friction": 2e-3},
+        )
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_noise_does_not_pass_for_a_mass(bench_record, seed):
+    """Noise in the acceleration gives a positive mass, but another one by another window."""
+    noise = SensorNoise(position=10e-6, pressure=100.0, seed=seed)
+    settings = dataclasses.replace(FOUR_COLUMNS, assumed_mass=1.6)
+    estimate = published_estimate(
+        bench_record("high", SquareWave(), 52.0, noise), BENCH_VALVE, settings
+    )
+    assert estimate.mass == 1.6
+    assert estimate.fixed == ("mass",)
+    assert any("with half the derivative window" in warning for warning in estimate.warnings)
+
+
+class TestEstimate:
+    def test_figures_are_those_of_the_chosen_step(self, bench_record):
+        estimate = published_estimate(bench_record("high", SquareWave(), 20.8, NOISE), BENCH_VALVE)
+        sweep = estimate.sweep
+        (chosen,) = np.flatnonzero(sweep.thresholds == estimate.threshold)
+        assert estimate.samples == sweep.samples[chosen]
+        assert estimate.sigma == sweep.sigma[chosen]
+        assert estimate.r_squared == sweep.r_squared[chosen]
+        for name in sweep.estimates:
+            assert getattr(estimate, name) == sweep.estimates[name][chosen]
+
+    def test_thresholds_of_the_paper(self, bench_record):
+        """(8) with S = 330 and Z = 350."""
+        record = bench_record("low", SquareWave(), 20.8)
+        estimate = published_estimate(record, BENCH_VALVE, FOUR_COLUMNS)
+        thresholds = estimate.sweep.thresholds
+        assert thresholds.size == 330
+        np.testing.assert_allclose(thresholds, thresholds[0] * np.arange(1, 331), rtol=1e-14)
+        speed = np.gradient(record.position, record.sample_period)
+        assert 350 * thresholds[0] == pytest.approx(np.abs(speed).max(), rel=0.02)
+
+
+class TestFixed:
+    @pytest.mark.parametrize("name", [name for name in FIXABLE if name != "limit_velocity"])
+    def test_it_is_returned_exactly_and_the_others_stay_true(self, bench_record, name):
+        fixed = {name: getattr(LOW_FRICTION, name)}
+        record = bench_record("low", SineWave(), 71.0)
+        estimate = published_estimate(record, BENCH_VALVE, IdentificationSettings(fixed=fixed))
+        assert getattr(estimate, name) == fixed[name]
+        assert estimate.fixed == (name,)
+        assert_identified(estimate, LOW_FRICTION, NOISE_FREE | {"spring_preload": 1e-3})
+
+    def test_a_fixed_mass_makes_the_square_wave_enough(self, bench_record):
+        record = bench_record("low", SquareWave(), 20.8)
+        settings = IdentificationSettings(fixed={"mass": LOW_FRICTION.mass})
+        estimate = published_estimate(record, BENCH_VALVE, settings)
+        assert estimate.warnings == ()
+        tolerances = NOISE_FREE | {"spring_preload": 1e-3}
+        assert_identified(estimate, LOW_FRICTION, tolerances)
+
+    def test_limit_velocity_sets_the_threshold(self, bench_record):
+        record = bench_record("low", SineWave(), 71.0)
+        settings = IdentificationSettings(fixed={"limit_velocity": 1e-3})
+        estimate = published_estimate(record, BENCH_VALVE, settings)
+        assert estimate.threshold == 1e-3
+        assert estimate.sweep.thresholds.tolist() == [1e-3]
+        assert_identified(estimate, LOW_FRICTION, NOISE_FREE)
+
+
+class TestRefusals:
+    def refused(self, record, settings=None):
+        with pytest.raises(RefusalError) as refusal:
+            published_estimate(record, BENCH_VALVE, settings)
+        return str(refusal.value)
+
+    def test_too_short(self, bench_record):
+        record = bench_record("low", SquareWave(), 20.8)
+        short = Recording(1e-3, record.pressure[:309], record.position[:309])
+        message = self.refused(short)
+        assert message.startswith("the record is too short: 309 samples (0.308 s)")
+        assert "at least 310" in message
+
+    @pytest.mark.parametrize("noise", [SensorNoise(), NOISE], ids=["clean", "noisy"])
+    def test_stem_never_moved(self, noise):
+        still = Recording(1e-3, np.linspace(4e4, 2e5, 20000), np.full(20000, 0.01))
+        message = self.refused(noise.applied_to(still))
+        assert message.startswith("the stem did not move: its position spans")
+
+    @pytest.mark.parametrize("noise", [SensorNoise(), NOISE], ids=["clean", "noisy"])
+    @pytest.mark.parametrize(("levels", "way"), [((6e4, 1.6e5), "up"), ((1.6e5, 6e4), "down")])
+    def test_one_direction(self, levels, way, noise):
+        """The noise of the resting stem is no motion the other way."""
+        pressure = converter_response(np.repeat(levels, [2000, 8000]), 1e-3)
+        position = simulate(BENCH_VALVE, LOW_FRICTION, pressure, 1e-3).position
+        message = self.refused(noise.applied_to(Recording(1e-3, pressure, position)))
+        assert message.startswith(f"the stem moved only {way}")
+
+    @pytest.mark.parametrize("left", [4 * 301 - 1, 4 * 301])
+    def test_too_few_moving_samples(self, bench_record, left):
+        """Less than a window, here of 301 samples, for each of four parameters is not enough."""
+        record = bench_record("low", SquareWave(), 20.8)
+        speed = np.abs(differentiate(record.position, record.sample_period, 301).velocity)
+        limit = np.partition(speed, -left - 1)[-left - 1]  # the speed that `left` are above
+        settings = IdentificationSettings(
+            derivative_window=301, position_bias=1.13e-3, fixed={"limit_velocity": limit}
+        )
+        if left < 4 * 301:
+            message = self.refused(record, settings)
+            assert message.startswith("no threshold leaves enough samples in motion")
+            assert "4 parameters" in message
+        else:
+            assert published_estimate(record, BENCH_VALVE, settings).samples == left
+
+
+class TestSettings:
+    @pytest.mark.parametrize(
+        ("arguments", "message"),
+        [
+            ({"order": 1}, r"^order must be at least 2"),
+            (
+                {"derivative_window": 30},
+                r"^derivative_window must be odd and at least order \+ 2 = 5, got 30",
+            ),
+            (
+                {"derivative_window": 3},
+                r"^derivative_window must be odd and at least order \+ 2 = 5, got 3",
+            ),
+            ({"steps": 0}, r"^steps \(0\) must be above zero"),
+            ({"steps": 350}, r"^steps \(350\) .* below resolution \(350\)"),
+            ({"assumed_mass": -1.0}, r"^assumed_mass must be above zero"),
+            ({"position_bias": np.nan}, r"^position_bias must be finite"),
+            *(
+                ({"timing_uncertainty": one}, r"^timing_uncertainty must")
+                for one in (-1e-3, np.nan, np.inf)
+            ),
+            ({"fixed": {"weight": 1.0}}, r"^'weight' is not a parameter .* mass, coulomb_friction"),
+            ({"fixed": {"mass": -1.0}}, r"^mass must be above zero"),
+            ({"fixed": {"spring_constant": "text"}}, r"^spring_constant must be a number"),
+            ({"fixed": {"spring_preload": np.inf}}, r"^spring_preload must be finite"),
+            ({"fixed": {"limit_velocity": 0.0}}, r"^limit_velocity must be above zero"),
+            (
+                {"position_bias": 1e-3, "fixed": {"spring_preload": 200.0}},
+                r"^position_bias and a fixed spring_preload exclude each other",
+            ),
+        ],
+    )
+    def test_refusals(self, arguments, message):
+        with pytest.raises(ValueError, match=message):
+            IdentificationSettings(**arguments)
+
+    def test_paper_defaults(self):
+        settings = IdentificationSettings()
+        assert (settings.published_window, settings.order) == (31, 3)
+        assert (settings.steps, settings.resolution) == (330, 350)
+        assert settings.fixed == {}
+        assert settings.position_bias is None
+
+
+def test_force_counts_from_the_reference(bench_record, benches):
+    """An absolute sensor reads an atmosphere more, and its valve says so: the same numbers."""
+    record = bench_record("low", SquareWave(), 20.8)
+    shifted = Recording(record.sample_period, record.pressure + 101325.0, record.position)
+    valve = Valve(0.0445, pressure_reference=BENCH_VALVE.pressure_reference + 101325.0)
+    estimate = published_estimate(shifted, valve, FOUR_COLUMNS)
+    assert_identified(estimate, benches["low"].parameters, NOISE_FREE)

@@ -22,8 +22,7 @@ from valve_friction_ros.identification import (
     Verdict,
     identify_signature,
 )
-from valve_friction_ros.identification.signature.strokes import fit_onset
-from valve_friction_ros.identification.signature.valve_signature import valve_signature
+from valve_friction_ros.identification.signature.valve_signature import fit_onset, valve_signature
 from valve_friction_ros.model import (
     BENCH_VALVE,
     IsaSteps,
@@ -92,16 +91,6 @@ def test_dead_zone_is_twice_the_sliding_friction(signature):
     assert 0 < found.dead_zone_share < 1
 
 
-def test_sliding_instants_have_the_speed_of_the_ramp(signature):
-    """The pressure rises by 165.1 kPa in 30 s, and the spring turns it into the way."""
-    _, plant, found = signature
-    rate = plant.valve.diaphragm_area * 165_100.0 / 30.0
-    for stroke in found.strokes:
-        assert stroke.steadiness > 0.85
-        expected = stroke.direction * rate / plant.parameters.spring_constant
-        np.testing.assert_allclose(np.median(stroke.sliding.velocity), expected, rtol=5e-3)
-
-
 @pytest.mark.parametrize("noise", NOISES, ids=["clean", "noisy"])
 def test_every_interval_holds_the_truth(bench, bench_record, noise):
     name, plant = bench
@@ -113,6 +102,8 @@ def test_every_interval_holds_the_truth(bench, bench_record, noise):
     assert found.parameters["spring_constant"].verdict is Verdict.IDENTIFIED
     assert found.parameters["static_friction"].verdict is Verdict.IDENTIFIED
     friction = found.parameters["coulomb_friction"]
+    if name == "high":  # no jump
+        assert friction.value == found.values["static_friction"]
     assert friction.verdict is Verdict.WEAK  # 1.2 mm/s says nothing about faster
     assert friction.reason.startswith("valid at 1.2 mm/s")
     assert friction.half_width < 0.05 * friction.value
@@ -123,12 +114,6 @@ def test_every_interval_holds_the_truth(bench, bench_record, noise):
     assert found.rms == pytest.approx(noise_level, abs=15e-6)
     assert found.fit > 0.995
     assert (found.estimate, found.misfit) == (None, None)
-
-
-def test_without_a_jump_coulomb_is_static_friction(bench_record):
-    record = bench_record("high", TriangleWave(), FIVE_STROKES)
-    values = identify_signature(record, BENCH_VALVE).values
-    assert values["coulomb_friction"] == values["static_friction"]
 
 
 class TestGiven:
@@ -200,15 +185,6 @@ class TestRefusals:
         found = identify_signature(late, BENCH_VALVE)
         assert found.signature.strokes[0].breakaway is None
         assert found.values["static_friction"] == pytest.approx(606.0, rel=0.02)
-
-
-def test_pressure_and_stem_against_each_other(bench_record):
-    record = bench_record("high", TriangleWave(), FIVE_STROKES)
-    mirrored = Recording(
-        record.sample_period, record.pressure, BENCH_VALVE.travel - record.position
-    )
-    with pytest.raises(RefusalError, match="the stem moves against the pressure"):
-        identify_signature(mirrored, BENCH_VALVE)
 
 
 class TestContradictions:
@@ -298,8 +274,3 @@ def test_noise_moves_the_onset_by_less_than_a_threshold_would():
     noise = 28.6e-6 * np.random.default_rng(0).standard_normal((10, TIME.size))
     errors = [fit_onset(TIME, motion(0.9, 0.22, 1.2e-3) + one, 1.0).time - 0.9 for one in noise]
     assert np.sqrt(np.mean(np.square(errors))) < 0.02
-
-
-def test_too_few_samples():
-    with pytest.raises(ValueError, match="7 samples are too few for an onset, at least 8"):
-        fit_onset(TIME[:7], TIME[:7], 0.0)

@@ -23,7 +23,8 @@ from valve_friction_ros.identification.engine.balance_regression import (
     Solved,
     inverse,
 )
-from valve_friction_ros.identification.engine.intervals import ROUNDING, Budget, Estimated
+from valve_friction_ros.identification.engine.fitted_record import inflation
+from valve_friction_ros.identification.engine.intervals import ROUNDING, Estimated
 from valve_friction_ros.identification.engine.lags import (
     LAGS,
     LARGEST_LAG,
@@ -33,9 +34,8 @@ from valve_friction_ros.identification.engine.lags import (
     normal,
     share_of_timing,
 )
-from valve_friction_ros.identification.engine.weights import inflation
+from valve_friction_ros.identification.settings import SLIDING
 from valve_friction_ros.identification.trust.verdict import FALL_SPEED
-from valve_friction_ros.identification.units import SLIDING
 
 _Array = NDArray[np.float64]
 
@@ -75,11 +75,6 @@ Chosen: most plants have one or two of the six."""
 
 _LARGEST_SCATTER = 25.0
 """Factor by which the scatter of the strokes widens the covariance at most."""
-
-
-def _heavy_tailed(deviations: _Array) -> _Array:
-    """Return the logarithm of Student's t density of two degrees of freedom, up to a constant."""
-    return np.asarray(-1.5 * np.log1p(deviations**2 / 2.0))
 
 
 class _Choice(NamedTuple):
@@ -266,7 +261,7 @@ class Posterior:
         if not dry > 0:
             return np.zeros_like(viscous)
         share = np.maximum(viscous, 0.0) * self.regression.sliding_speed / dry
-        return _heavy_tailed(share / _USUAL_VISCOUS)
+        return np.asarray(-1.5 * np.log1p((share / _USUAL_VISCOUS) ** 2 / 2.0))
 
     def _exchange(self) -> None:
         """Weigh the other order of two lags.
@@ -343,9 +338,8 @@ class Posterior:
         high = mixture_half_width(np.asarray(weights), values, record, value)
         timing = share_of_timing(high, math.sqrt(open_), timing)
         sources = {ROUNDING: rounding} if rounding > 0.0 else {}
-        return Estimated(
-            value, high, Budget(math.sqrt(open_), timing, sources, timing * self._unsaid()), rival
-        )
+        shared = timing * self._unsaid()
+        return Estimated(value, high, math.sqrt(open_), timing, sources, shared, rival)
 
     def _unsaid(self) -> float:
         """Return the share of the lag's uncertainty that comes from its prior, not from noise.

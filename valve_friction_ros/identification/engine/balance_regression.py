@@ -17,26 +17,26 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from valve_friction_ros.identification.engine.imperfections import (
+from valve_friction_ros.identification.engine.coordinates import (
     IMPERFECTIONS,
     MASS_PER_AREA,
     sensor_span,
     zero_drift,
 )
+from valve_friction_ros.identification.engine.intervals import RECTANGLE
 from valve_friction_ros.identification.engine.lags import (
     LARGEST_LAG,
     LagPrior,
 )
-from valve_friction_ros.identification.engine.numbers import RECTANGLE
 from valve_friction_ros.identification.engine.sliding_averages import (
     WORK_LAGS,
     Averages,
     Work,
     averaged_twice,
 )
+from valve_friction_ros.identification.settings import SLIDING
 from valve_friction_ros.identification.trust.sliding import SPEED_EXPONENT
 from valve_friction_ros.identification.trust.uncertainty import MEDIAN_MAGNITUDE
-from valve_friction_ros.identification.units import SLIDING
 from valve_friction_ros.model.valve import Valve
 
 _Array = NDArray[np.float64]
@@ -65,25 +65,13 @@ _BLOCKS = (6, 60)
 
 
 class Solved(NamedTuple):
-    """The regression at one lag and one Stribeck speed, in columns scaled to one size.
+    """The regression about one `lag`, s, at one Stribeck speed, in columns of the sizes `scale`.
 
-    Attributes
-    ----------
-    lag : float
-        Lag about which it is linearised, s.
-    estimate, covariance : ndarray of float, shapes (p,) and (p, p)
-        Coefficients of the scaled columns: those of `Regression.names`, the lag unless it is known,
-        and the slip force last, where friction falls with speed.
-    residual, columns : list of ndarray of float, shapes (n,) and (n, p)
-        Residual force, N, and regressors, of both halves of the samples.
-    weight : ndarray of float, shape (n,)
-        1 for each average that is used, else 0.
-    precision, expected : ndarray of float, shape (p,)
-        Precision and mean of the prior of each coefficient.
-    scale : ndarray of float, shape (p,)
-        Sizes of the columns.
-    information, right : ndarray of float, shapes (p, p) and (p,)
-        Normal equations of the record alone, without the priors.
+    The coefficients are those of `Regression.names`, the lag unless it is known, and the slip force
+    last, where friction falls with speed: `estimate` and `covariance`, with the `precision` and the
+    `expected` value of their priors. Residual force, N, and columns are of both halves of the
+    samples; the `weight` is 1 for each average that is used, else 0. `information` and `right` are
+    the normal equations of the record alone, without the priors.
     """
 
     lag: float
@@ -174,8 +162,9 @@ class Regression:
         if self.spring == 0.0:
             for name in ("spring_constant", "curvature", "cubic"):
                 del terms[name]
+        known = [(value, terms[name][0]) for name, value in fixed.items() if name in terms]
         self.known = [
-            sum(value * terms[name][0][half] for name, value in fixed.items() if name in terms)
+            sum((value * term[half] for value, term in known), np.zeros_like(side))
             for half in (0, 1)
         ]
         for name in fixed.keys() & (terms.keys() - {"mass"}):
@@ -206,15 +195,11 @@ class Regression:
         taken = np.arange(self.averages.taken.size)
         return np.array_split(taken, int(np.clip(self.strokes, *_BLOCKS)))
 
-    def falling(self, velocity: _Array, stribeck: float) -> _Array:
-        """Share of the slip force that is left at each velocity."""
-        return np.asarray(np.exp(-((velocity / stribeck) ** 2)))
-
     def slip(self, stribeck: float) -> _Array:
         """Regressor of the slip force at the averages that are taken."""
         if stribeck not in self.slips:
             velocity = self.velocity[self.averages.taken]
-            self.slips[stribeck] = np.sign(velocity) * self.falling(velocity, stribeck)
+            self.slips[stribeck] = np.sign(velocity) * np.exp(-((velocity / stribeck) ** 2))
         return self.slips[stribeck]
 
     def solve(
@@ -224,7 +209,7 @@ class Regression:
         averages, taken = self.averages, self.averages.taken
         at = averages.time[taken] - lag
         forces = [
-            np.interp(at, averages.time, averages.force[half]) - _at(self.known[half], taken)
+            np.interp(at, averages.time, averages.force[half]) - self.known[half][taken]
             for half in (0, 1)
         ]
         columns, precision = self.columns, self.precision.copy()
@@ -436,10 +421,6 @@ def _kept_by(work: Work, place: _Array, age: _Array) -> dict[str, float]:
         "drift": age,
     }
     return {name: float(work.along @ term) for name, term in terms.items()}
-
-
-def _at(signal: "_Array | float", taken: NDArray[np.intp]) -> "_Array | float":
-    return signal[taken] if isinstance(signal, np.ndarray) else signal
 
 
 def _shared(own: _Array, cross: _Array, right: _Array, independent: float) -> tuple[_Array, _Array]:

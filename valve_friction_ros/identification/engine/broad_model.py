@@ -18,9 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from valve_friction_ros.identification.engine.coordinates import (
+    IMPERFECTIONS,
+    TIMING,
     Coordinates,
     jacobian,
     physical,
+    sensor_span,
     straight,
 )
 from valve_friction_ros.identification.engine.driven_stem import (
@@ -30,13 +33,7 @@ from valve_friction_ros.identification.engine.driven_stem import (
     read_slopes,
     read_stem,
 )
-from valve_friction_ros.identification.engine.fitted_record import FittedRecord
-from valve_friction_ros.identification.engine.imperfections import (
-    IMPERFECTIONS,
-    TIMING,
-    sensor_span,
-)
-from valve_friction_ros.identification.engine.weights import reading_weights
+from valve_friction_ros.identification.engine.fitted_record import FittedRecord, reading_weights
 
 ABSENT = dict.fromkeys(IMPERFECTIONS, 0.0)
 """No imperfections; the mass has to be set."""
@@ -61,10 +58,11 @@ digits and more; the simulation is exact, so the step may be small."""
 
 
 class Simulated(NamedTuple):
-    """The stem at each step: position (m) and velocity (m/s)."""
+    """The stem at each step, position (m) and velocity (m/s), and the number of events."""
 
     position: NDArray[np.float64]
     velocity: NDArray[np.float64]
+    events: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,16 +78,10 @@ class BroadModel:
 
         (a·ξ + b·τ)·F_c + e·F_c·exp(−|ẋ|/3 mm/s) .
 
-    Attributes
-    ----------
-    record : FittedRecord
-        The record.
-    usual_spring : float
-        Spring constant, N/m, that converts noise of the force to noise of the stem. It is the same
-        throughout a fit, so that no fit gains by a spring that lowers the noise.
-    coarseness : float
-        Factor of the steps of differentiation. Far from the end of a fit, wide steps bridge the
-        kinks at which a stem stops or breaks away; with 1 the derivatives are exact.
+    The `usual_spring`, N/m, converts noise of the force to noise of the stem. It is the same
+    throughout a fit, so that no fit gains by a spring that lowers the noise. The `coarseness`
+    multiplies the steps of differentiation: far from the end of a fit, wide steps bridge the kinks
+    at which a stem stops or breaks away; with 1 the derivatives are exact.
     """
 
     record: FittedRecord
@@ -138,21 +130,14 @@ class BroadModel:
         """Simulate the stem itself."""
         force = np.empty_like(self.record.force)
         position, velocity = np.empty_like(force), np.empty_like(force)
-        drive_stem(self.course(self.record.force), Place(**at), force, position, velocity)
-        return Simulated(position, velocity)
+        course = self.course(self.record.force)
+        stepped = drive_stem(course, Place(**at), force, position, velocity)
+        return Simulated(position, velocity, stepped)
 
     def effort(self, at: Coordinates) -> int:
         """Return the work of one simulation, in steps that take a short cut."""
-        force = np.empty_like(self.record.force)
-        stepped = drive_stem(
-            self.course(self.record.force),
-            Place(**at),
-            force,
-            np.empty_like(force),
-            np.empty_like(force),
-        )
         short_cut, event = _FALLING if at["stribeck_velocity"] else _CONSTANT
-        return short_cut * force.size + event * stepped
+        return short_cut * self.record.force.size + event * self.simulate(at).events
 
     def readings(self, at: Coordinates) -> NDArray[np.float64]:
         """Return the readings of the stem's sensor, m, one per cell, by each half: (2, c)."""

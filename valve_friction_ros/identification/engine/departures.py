@@ -25,14 +25,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from valve_friction_ros.identification.engine.imperfections import (
+from valve_friction_ros.identification.engine.coordinates import (
     IMPERFECTIONS,
     sensor_span,
     zero_drift,
 )
-from valve_friction_ros.identification.engine.intervals import Budget, Estimated
+from valve_friction_ros.identification.engine.intervals import RECTANGLE, Estimated
 from valve_friction_ros.identification.engine.lags import LagPrior
-from valve_friction_ros.identification.engine.numbers import RECTANGLE
 from valve_friction_ros.identification.engine.sliding_averages import (
     MeasuredSignal,
     averaged_twice,
@@ -132,22 +131,9 @@ def static_friction(
 ) -> Departed | None:
     """Estimate F_s from the forces at which the stem leaves its rests.
 
-    Parameters
-    ----------
-    record : StampedRecord
-        Drive and stem at their own stamps.
-    valve : Valve
-        Geometry.
-    numbers : mapping of str to Estimated
-        Spring constant and preload, as far as they are known.
-    lag : LagPrior
-        Prior of the lag.
-
-    Returns
-    -------
-    Departed or None
-        None where there are too few departures, or the stem does not slip: a force that does not
-        fall while the stem moves leaves F_s and F_c the same.
+    The `numbers` hold spring constant and preload, as far as they are known. None where there are
+    too few departures, or the stem does not slip: a force that does not fall while the stem moves
+    leaves F_s and F_c the same.
     """
     is_known = {"spring_constant", "spring_preload"} <= numbers.keys()
     force, stem = force_and_stem(record, valve)
@@ -364,7 +350,7 @@ def _estimated(
     width = half_width(float(error[0]), freedom)
     whole = max(math.hypot(width, taken, scatter, NORMAL_QUANTILE * meaning), _LEAST_SHARE * value)
     record = math.sqrt(max((whole / NORMAL_QUANTILE) ** 2 - timing**2, 0.0))
-    return Estimated(value, whole, Budget(record, timing, {}, timing)), known
+    return Estimated(value, whole, record, timing, shared=timing), known
 
 
 def _by_least_magnitudes(columns: _Array, values: _Array) -> _Array:

@@ -28,24 +28,12 @@ _AT_STEP = 1e-6
 
 
 class Course(NamedTuple):
-    """Drive of the stem at each step of the simulation, and the slow terms there.
+    """Drive of the stem at each step of the simulation, and the slow terms there, shape (g,).
 
-    Attributes
-    ----------
-    period : float
-        Step, s.
-    travel : float
-        Travel of the valve, m.
-    stroke, span : float
-        Range of the measured positions, m, and of the sensor of the force, N.
-    force : ndarray of float, shape (g,)
-        Actuator force, N.
-    place, age : ndarray of float, shape (g,)
-        Measured position and time, −1 to 1.
-    slowness : ndarray of float, shape (g,)
-        Share of the friction at rest that is left at the measured speed.
-    anew, leaving : ndarray of float, shape (g,)
-        Position to which the stem is reset, m, nan elsewhere; its velocity there, m/s.
+    Period, s, travel, m, and the ranges of the measured positions, m, and of the sensor of the
+    force, N. Then the force, N; position and time, −1 to 1; the share of the friction at rest that
+    is left at the measured speed; the position to which the stem is reset, m, nan elsewhere; and
+    its velocity there, m/s.
     """
 
     period: float
@@ -421,24 +409,11 @@ def read_slopes(
     room: NDArray[np.float64],
     slopes: NDArray[np.float64],
 ) -> None:
-    """Differentiate the readings of `read_stem`; one simulation carries all derivatives along.
+    """Differentiate the readings of `read_stem`, (c, p), all in one simulation.
 
-    Parameters
-    ----------
-    course : Course
-        Drive of the stem.
-    at : Place
-        The coordinates.
-    coordinates : ndarray of int, shape (p,)
-        Coordinates by which to differentiate, numbered as in `Place`.
-    turned : ndarray of float, shape (p, p)
-        Derivatives of these coordinates by those of the result (columns).
-    cells : ndarray of float, shape (c,)
-        Times at which the sensor is read, in steps.
-    room : ndarray of float, shape (2, g, p)
-        Work space. Allocating it at each call would cost more than the work.
-    slopes : ndarray of float, shape (c, p)
-        The result, m over the unit of a coordinate.
+    The `coordinates`, (p,), are numbered as in `Place`; `turned`, (p, p), are their derivatives by
+    the coordinates of the result (columns); `cells`, (c,), are the times of the readings, in steps.
+    The `room`, (2, g, p), is work space: allocating it at each call would cost more than the work.
     """
     force = np.empty_like(course.force)
     positions, velocities = np.empty_like(force), np.empty_like(force)

@@ -86,20 +86,9 @@ _REST_MARGIN = 0.15
 class SlowView:
     """Slow terms along the measured stem and along time, at each step of the simulation.
 
-    Attributes
-    ----------
-    place : ndarray of float
-        Position, −1 at the lowest and 1 at the highest measured position.
-    age : ndarray of float
-        Time, −1 at the beginning and 1 at the end.
-    speed : ndarray of float
-        Speed, m/s.
-    slowness : ndarray of float
-        exp(−speed/`LOW_SPEED`), the speed averaged until its noise hardly matters.
-    force : ndarray of float
-        Actuator force, N, averaged like the stem.
-    lowest, highest : float
-        Ends of the measured positions, m.
+    Place and age run from −1 at the lowest position and the beginning to 1 at the highest and the
+    end. Velocity, m/s, and actuator force, N, are averaged alike; `slowness` is
+    exp(−speed/`LOW_SPEED`), with the speed averaged until its noise hardly matters.
     """
 
     place: NDArray[np.float64]
@@ -119,41 +108,26 @@ class SlowView:
 
 @dataclass(frozen=True, eq=False)
 class FittedRecord:
-    """A record prepared for the fit.
+    """A record prepared for the fit: g steps of a simulation, and c cells of the stem's samples.
 
     Attributes
     ----------
-    period : float
-        Step of the simulation, s.
-    force : ndarray of float, shape (g,)
-        Smoothed actuator force at each step, N.
-    halves : ndarray of float, shape (2, g)
-        The same from the even samples alone and from the odd samples: their noise is independent.
+    period, travel, lost, start : float
+        Step, s; travel, m; time in gaps, s; position at the first step, m.
+    force, halves : ndarray of float, shapes (g,) and (2, g)
+        Smoothed actuator force, N; the same from the even samples alone and from the odd samples,
+        whose noise is independent.
     anew, leaving : ndarray of float, shape (g,)
         Position to which the stem is reset after a gap, m, nan elsewhere; and its velocity there
         and at the start, m/s.
-    cells : ndarray of float, shape (c,)
-        Mean stamp of the positions between two steps, in steps.
-    position : ndarray of float, shape (c,)
-        Mean measured position in each cell, m.
-    time : ndarray of float, shape (c,)
-        Mean time of each cell, s.
-    samples : ndarray of float, shape (c,)
-        Samples in each cell.
-    noise : float
-        Deviation of the noise of one sample of the stem, m.
-    force_variance : ndarray of float, shape (c,)
-        Variance of the smoothed force, N².
-    memory : float
-        Cells through which the error of the smoothed force stays the same.
+    cells, time, samples : ndarray of float, shape (c,)
+        Mean stamp of the positions between two steps, in steps and in s; and their number.
+    position, noise : ndarray of float, shape (c,), and float
+        Mean position in each cell, and deviation of the noise of one sample, m.
+    force_variance, memory : ndarray of float, shape (c,), and float
+        Variance of the smoothed force, N², and cells through which its error stays the same.
     slow : SlowView
         Slow terms.
-    travel : float
-        Travel of the valve, m.
-    lost : float
-        Time in gaps, s.
-    start : float
-        Position at the first step, m.
     """
 
     period: float
@@ -192,19 +166,7 @@ class FittedRecord:
 
 
 class _Smoothed(NamedTuple):
-    """A smoothed signal on a grid.
-
-    Attributes
-    ----------
-    whole : ndarray of float, shape (g,)
-        From all samples.
-    halves : ndarray of float, shape (2, g)
-        From the even samples and from the odd samples.
-    variance : ndarray of float, shape (g,)
-        Variance of the noise of `whole`.
-    window : int
-        Steps of the grid over which it is smoothed.
-    """
+    """A signal smoothed over a `window` of steps, its halves, (2, g), and its variance, (g,)."""
 
     whole: NDArray[np.float64]
     halves: NDArray[np.float64]
@@ -317,10 +279,8 @@ def fitted_record(record: StampedRecord, valve: Valve) -> FittedRecord:
     The simulated stem is read where the stem was stamped, so jitter, drops and rates cost no more
     than the samples that they take. The positions of one step are averaged, which loses nothing.
 
-    Raises
-    ------
-    RefusalError
-        If the signals have too little time in common, or far too much for their sampling.
+    Raises RefusalError if the signals have too little time in common, or far too much for their
+    sampling.
     """
     sampled, measured = without_repeats(record.drive), without_repeats(record.position)
     begin = max(sampled.time[0], measured.time[0])
@@ -433,3 +393,52 @@ def set_anew_at_rests(record: FittedRecord) -> FittedRecord:
         if last - mean > begin and last > 0:
             anew[last] = float(np.mean(positions[last - mean : last]))
     return replace(record, anew=anew)
+
+
+_MOVING = 0.1
+_FEWEST_BLOCKS = 8
+
+
+def reading_weights(record: FittedRecord, spring_constant: float) -> NDArray[np.float64]:
+    """Return one over the effective deviation of each cell, 1/m.
+
+    The noise of the stem is white: s_x²/n in a cell of n samples. The noise of the smoothed force,
+    of variance s_F², moves the stem by s_F/k, equally in all cells over which it lasts: those of
+    the smoothing window, or of a rest, which keeps the error at the stop. L such cells have the
+    weight of one if each has the variance s_x²/n + L·s_F²/k².
+    """
+    still = record.still[np.rint(record.cells).astype(np.intp)]
+    lasting = np.full(still.size, record.memory)
+    variance = record.force_variance.copy()
+    reach = math.ceil(record.memory)
+    for begin, end in runs_of(still):
+        at_stop = record.force_variance[max(begin - reach, 0) : begin + reach]
+        variance[begin:end] = np.max(at_stop)
+        lasting[begin:end] = max(end - begin, record.memory)
+    white = record.noise**2 / record.samples
+    weights: NDArray[np.float64] = 1.0 / np.sqrt(white + lasting * variance / spring_constant**2)
+    return weights
+
+
+def stroke_cells(record: FittedRecord) -> int:
+    """Return the mean number of cells between two reversals of the measured stem."""
+    velocity = record.slow.velocity
+    moving = velocity[np.abs(velocity) > _MOVING * np.max(np.abs(velocity))]
+    reversals = int(np.count_nonzero(np.diff(np.sign(moving))))
+    return record.position.size // (reversals + 1)
+
+
+def inflation(scaled: NDArray[np.float64], stroke: int) -> float:
+    """Return the variance of the mean of scaled residuals over that of independent ones, ≥ 1.
+
+    Blocks of 1, 2, 4 … cells up to a stroke are averaged; the result is the largest product of
+    their length and the mean square of their averages. It is 1 for noise as foreseen, and grows
+    with the size and the duration of a misfit.
+    """
+    largest, length = max(float(np.mean(scaled**2)), 1.0), 2
+    while length <= stroke and scaled.size // length >= _FEWEST_BLOCKS:
+        blocks = scaled.size // length
+        means = scaled[: blocks * length].reshape(blocks, length).mean(axis=1)
+        largest = max(largest, length * float(np.mean(means**2)))
+        length *= 2
+    return largest

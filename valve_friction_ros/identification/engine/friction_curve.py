@@ -32,10 +32,13 @@ from numpy.typing import NDArray
 
 from valve_friction_ros.identification.engine.balance_posterior import Posterior, posterior_of
 from valve_friction_ros.identification.engine.balance_regression import Regression
-from valve_friction_ros.identification.engine.imperfections import sensor_span, zero_drift
-from valve_friction_ros.identification.engine.intervals import ROUNDING, Budget, Estimated
+from valve_friction_ros.identification.engine.coordinates import sensor_span, zero_drift
+from valve_friction_ros.identification.engine.intervals import (
+    RECTANGLE,
+    ROUNDING,
+    Estimated,
+)
 from valve_friction_ros.identification.engine.lags import LAGS, LARGEST_LAG, LagPrior, LagProfile
-from valve_friction_ros.identification.engine.numbers import RECTANGLE
 from valve_friction_ros.identification.engine.sliding_averages import (
     FINEST_STEP,
     WORK_LAGS,
@@ -49,6 +52,7 @@ from valve_friction_ros.identification.engine.sliding_averages import (
     turns_of,
     work_of_rounding,
 )
+from valve_friction_ros.identification.settings import SLIDING
 from valve_friction_ros.identification.trust.uncertainty import (
     CONFIDENCE,
     NORMAL_QUANTILE,
@@ -56,7 +60,6 @@ from valve_friction_ros.identification.trust.uncertainty import (
     correlation_of,
     half_width,
 )
-from valve_friction_ros.identification.units import SLIDING
 from valve_friction_ros.model.recording import StampedRecord
 from valve_friction_ros.model.valve import Valve
 
@@ -128,31 +131,15 @@ the record and none, half of it in the mean, and evenly (half of 1/√3)."""
 
 @dataclass(frozen=True, eq=False)
 class FrictionCurve:
-    """Friction over speed, and the force balance that it comes from, at one averaging time.
+    """Friction over speed, and its force balance, at one averaging time, s.
 
-    Attributes
-    ----------
-    averaging_time : float
-        Time over which force and stem are averaged, twice, s.
-    speed, friction, standard_error : ndarray of float, shape (b,)
-        Mean velocity of each bin (m/s, negative downward), mean friction there (N), and its
-        standard error (N). No law is assumed except that of the spring.
-    numbers : mapping of str to Estimated
-        Parameters and sliding friction, SI units.
-    sliding_speed : float
-        Mean speed over the distance, m/s, at which the sliding friction holds.
-    stribeck_velocity : float
-        v_s, m/s; 0 where friction does not surely fall with speed.
-    lag : float
-        Most probable time by which the stem is seen late, s.
-    inflation : float
-        Inflation of the residual over what noise explains.
-    fit, misfit : float
-        Share of the force that the balance reproduces, and deviation of the residual, N.
-    correlation : Correlation or None
-        Correlation of the errors of the numbers.
-    posterior : Posterior or None
-        Posterior of the regression; None for whole strokes.
+    Each bin has the mean velocity `speed` (m/s, negative downward), the mean friction there and its
+    standard error (N); no law is assumed except that of the spring. The `numbers` are parameters
+    and sliding friction, which holds at the `sliding_speed`, the mean speed over the distance.
+    `stribeck_velocity` is 0 where friction does not surely fall with speed; `lag` is the most
+    probable time by which the stem is seen late, s; `fit` is the share of the force that the
+    balance reproduces, `misfit` the deviation of the residual, N, and `inflation` that over what
+    noise explains. Whole strokes have neither a correlation of the numbers nor a posterior.
     """
 
     averaging_time: float
@@ -193,25 +180,12 @@ def friction_curves(
     lag: LagPrior | None = None,
     fixed: Mapping[str, float] | None = None,
 ) -> list[FrictionCurve]:
-    """Regress friction over speed, for several averaging times.
+    """Regress friction over speed, for several averaging times, the shortest first.
 
-    Parameters
-    ----------
-    record : StampedRecord
-        Drive and stem position at their own stamps.
-    valve : Valve
-        Geometry.
-    lag : LagPrior, optional
-        Prior of the lag.
-    fixed : mapping of str to float, optional
-        Known parameters; a spring constant of 0 for a machine without a spring.
-
-    Returns
-    -------
-    list of FrictionCurve
-        The shortest averaging time first. Where the stem nowhere surely slides both ways, or whole
-        strokes exclude the result of a single averaging time, only the curve of the strokes, with
-        the sliding friction (`_by_strokes`); empty with too few strokes.
+    The `fixed` parameters are known; a spring constant of 0 is a machine without a spring. Where
+    the stem nowhere surely slides both ways, or whole strokes exclude the result of a single
+    averaging time, only the curve of the strokes is returned, with the sliding friction
+    (`_by_strokes`); nothing with too few strokes.
     """
     lag, fixed = lag or LagPrior(), fixed or {}
     force, stem = force_and_stem(record, valve)
@@ -345,7 +319,10 @@ def _by_strokes(
     sliding = Estimated(
         value,
         math.hypot(of_record, of_lag),
-        Budget(of_record / NORMAL_QUANTILE, timing, sources, timing),
+        of_record / NORMAL_QUANTILE,
+        timing,
+        sources,
+        timing,
     )
     return FrictionCurve(
         step,

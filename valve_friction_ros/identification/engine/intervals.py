@@ -11,34 +11,155 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from enum import Enum, auto
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from valve_friction_ros.identification.engine.broad_model import SWINGING, BroadModel
-from valve_friction_ros.identification.engine.coordinates import MAIN, Coordinates
-from valve_friction_ros.identification.engine.imperfections import IMPERFECTIONS, TIMING, Profile
+from valve_friction_ros.identification.engine.coordinates import (
+    IMPERFECTIONS,
+    MAIN,
+    TIMING,
+    Coordinates,
+    sensor_span,
+)
+from valve_friction_ros.identification.engine.fitted_record import stroke_cells
 from valve_friction_ros.identification.engine.lags import (
-    LARGEST_LAG,
     LagPrior,
     LagProfile,
     mixture_half_width,
     share_of_timing,
     spread_of,
 )
-from valve_friction_ros.identification.engine.numbers import (
-    RECTANGLE,
-    ReportedNumber,
-    loop_friction,
-    reported_numbers,
+from valve_friction_ros.identification.engine.posterior_fit import PosteriorFit
+from valve_friction_ros.identification.settings import SLIDING
+from valve_friction_ros.identification.trust.sliding import (
+    FINEST_SLIDING,
+    mean_over_distance,
+    mean_speed,
 )
-from valve_friction_ros.identification.engine.posterior_fit import PosteriorFit, Stage
-from valve_friction_ros.identification.engine.weights import stroke_cells
-from valve_friction_ros.identification.trust.sliding import FINEST_SLIDING
 from valve_friction_ros.identification.trust.uncertainty import NORMAL_QUANTILE
-from valve_friction_ros.identification.units import SLIDING
+
+RECTANGLE = 1.0 / math.sqrt(3.0)
+"""Standard deviation of a rectangular distribution over its half width."""
+
+_MOVING = 0.02
+"""Share of the top speed above which the averaged stem moves."""
+
+ASYMMETRY = 0.05
+"""Standard deviation of the share by which F_c is larger upward: it has the effect of a change of
+F_0, and no record can separate the two."""
+
+
+@dataclass(frozen=True)
+class ReportedNumber:
+    """A number at one point of the fit, SI unit, and its derivatives by the coordinates.
+
+    `definition` is its standard deviation where the quantity has no single value: a friction that
+    changes along the travel, the constant of a curved spring.
+    """
+
+    value: float
+    gradient: Mapping[str, float]
+    definition: float
+
+
+def _sliding(model: BroadModel, at: Coordinates, asymmetry: float) -> ReportedNumber:
+    """Return ∫|F_friction|·|dx| / ∫|dx| of the simulated stem."""
+    slow = model.record.slow
+    velocity = model.simulate(at).velocity
+    speed = np.abs(velocity)
+    mean = mean_speed(speed)
+    place, age = mean_over_distance(slow.place, speed), mean_over_distance(slow.age, speed)
+    low = mean_over_distance(slow.slowness, speed)
+    dry, viscous = at["coulomb_friction"], at["viscous_friction"]
+    falling = 0.0
+    if at["stribeck_velocity"] > 0:
+        falling = mean_over_distance(np.exp(-((speed / at["stribeck_velocity"]) ** 2)), speed)
+    share = 1 + at["along_travel"] * place + at["in_record"] * age + at["at_low_speed"] * low
+    value = dry * share + viscous * mean + at["slip_force"] * falling
+    gradient = {
+        "coulomb_friction": share,
+        "viscous_friction": mean,
+        "along_travel": place * dry,
+        "in_record": age * dry,
+        "at_low_speed": dry * low,
+        "slip_force": falling,
+    }
+    net = abs(float(np.sum(velocity))) / max(float(np.sum(speed)), np.finfo(float).tiny)
+    return ReportedNumber(value, gradient, asymmetry * dry * net)
+
+
+def reported_numbers(
+    model: BroadModel, at: Coordinates, asymmetry: float = ASYMMETRY
+) -> dict[str, ReportedNumber]:
+    """Return all reported numbers at a point of the fit.
+
+    `asymmetry` is the standard deviation of the share by which F_c is larger upward.
+
+    A friction that changes by ±a over the travel or over the record, or that is larger by a at low
+    speed, has no single value; the number is then taken to lie anywhere within ±a. The same
+    applies to a spring whose constant changes by ±4c over the measured range.
+    """
+    slow = model.record.slow
+    dry, spring = at["coulomb_friction"], at["spring_constant"]
+    static = dry + at["slip_force"]
+    friction = RECTANGLE * math.hypot(at["along_travel"], at["in_record"], at["at_low_speed"])
+    curve = abs(at["curvature"]) + abs(at["cubic"])
+    stiffness = RECTANGLE * 4.0 * curve * spring
+    middle = 0.5 * (slow.lowest + slow.highest)
+    seat = -2.0 * middle / slow.range
+    bow = RECTANGLE * curve * spring * slow.range * max(abs(seat**2 - 1 / 3), 2 / 3)
+    drift = RECTANGLE * abs(at["drift"]) * sensor_span(model.record.force)
+    preload = math.hypot(bow, stiffness * abs(middle), drift, asymmetry * dry)
+    static_gradient = {"coulomb_friction": 1.0, "slip_force": 1.0}
+    numbers = {
+        "mass": ReportedNumber(at["mass"], {"mass": 1.0}, 0.0),
+        "viscous_friction": ReportedNumber(
+            at["viscous_friction"], {"viscous_friction": 1.0}, friction * at["viscous_friction"]
+        ),
+        "coulomb_friction": ReportedNumber(dry, {"coulomb_friction": 1.0}, friction * dry),
+        "static_friction": ReportedNumber(static, static_gradient, friction * static),
+        "spring_constant": ReportedNumber(spring, {"spring_constant": 1.0}, stiffness),
+        "spring_preload": ReportedNumber(at["spring_preload"], {"spring_preload": 1.0}, preload),
+        "sliding_friction": _sliding(model, at, asymmetry),
+    }
+    if at["stribeck_velocity"] > 0:
+        speed = at["stribeck_velocity"]
+        numbers["stribeck_velocity"] = ReportedNumber(speed, {"stribeck_velocity": 1.0}, 0.0)
+    return numbers
+
+
+def found_sizes(_: BroadModel, at: Coordinates) -> dict[str, ReportedNumber]:
+    """Return imperfections at a point of the fit that may be compared with those of another record.
+
+    The ``lag`` of the stem behind the pressure, s, is the sum of all timing; ``slip_force`` is
+    F_s − F_c, N; ``viscous_asymmetry`` is the share by which F_v is larger upward.
+    """
+    lag = sum(at[name] for name in TIMING)
+    return {
+        "lag": ReportedNumber(lag, dict.fromkeys(TIMING, 1.0), 0.0),
+        "slip_force": ReportedNumber(at["slip_force"], {"slip_force": 1.0}, 0.0),
+        "viscous_asymmetry": ReportedNumber(
+            at["viscous_asymmetry"], {"viscous_asymmetry": 1.0}, 0.0
+        ),
+    }
+
+
+def loop_friction(model: BroadModel, at: Coordinates) -> float:
+    """Return the work of friction over the distance by the measured signals alone, N.
+
+    The work of the actuator less what the spring keeps: ∫(F − k·x − F_0)·dx / ∫|dx|. The spring is
+    taken from the fit, and matters only if the stem does not end where it began. No model of the
+    friction is used.
+    """
+    slow = model.record.slow
+    position = slow.lowest + 0.5 * (slow.place + 1.0) * slow.range
+    moved = np.where(slow.speed > _MOVING * np.quantile(slow.speed, 0.98), slow.velocity, 0.0)
+    surplus = slow.force - at["spring_constant"] * position - at["spring_preload"]
+    return float(np.sum(surplus * moved) / np.sum(np.abs(moved)))
+
 
 NumbersAt = Callable[[BroadModel, Coordinates], Mapping[str, ReportedNumber]]
 """Function of a model and a point of its fit: numbers by name."""
@@ -83,53 +204,29 @@ _FINEST_OTHER = 5e-4
 
 
 @dataclass(frozen=True)
-class Budget:
-    """Standard uncertainties by their sources, in the number's unit (after the GUM).
-
-    Attributes
-    ----------
-    record : float
-        Noise and misfit of the record, and its imperfections.
-    timing : float
-        Lag between the signals.
-    sources : mapping of str to float
-        Due to each imperfection whose prior matters, timing included, and the force's converter.
-    shared : float
-        Part of the timing that the record does not determine: another record of the same sensors
-        has the same error.
-    """
-
-    record: float
-    timing: float
-    sources: Mapping[str, float]
-    shared: float = 0.0
-
-
-@dataclass(frozen=True)
 class Estimated:
-    """A number with its interval.
+    """A number with its interval, SI unit, and its standard uncertainty by origin (after the GUM).
 
-    Attributes
-    ----------
-    value, half_width : float
-        SI unit.
-    budget : Budget
-        Sources of its width.
-    rival : float
-        The value if a slow sensor of the stem, and not viscous friction, made the stem late; nan
-        where the record excludes that.
+    `record` is from noise, misfit and imperfections of the record, `timing` from the lag between
+    the signals, and `sources` from each imperfection whose prior matters, timing included, and from
+    the force's converter. The record does not determine the `shared` part of the timing: another
+    record of the same sensors has the same error. The `rival` is the value if a slow sensor of the
+    stem, and not viscous friction, made the stem late; nan where the record excludes that.
     """
 
     value: float
     half_width: float
-    budget: Budget
+    record: float
+    timing: float = 0.0
+    sources: Mapping[str, float] = field(default_factory=dict)
+    shared: float = 0.0
     rival: float = math.nan
 
     @property
     def shared_half_width(self) -> float:
         """Part of the half width that another record of the same sensors has in common."""
-        whole = math.hypot(self.budget.record, self.budget.timing)
-        return self.half_width * self.budget.shared / whole if whole > 0 else 0.0
+        whole = math.hypot(self.record, self.timing)
+        return self.half_width * self.shared / whole if whole > 0 else 0.0
 
     @property
     def own_half_width(self) -> float:
@@ -139,7 +236,7 @@ class Estimated:
     @property
     def rounding(self) -> float:
         """Part of the half width that comes from the converter of the force."""
-        return NORMAL_QUANTILE * self.budget.sources.get(ROUNDING, 0.0)
+        return NORMAL_QUANTILE * self.sources.get(ROUNDING, 0.0)
 
     @property
     def but_rounding(self) -> float:
@@ -156,9 +253,12 @@ def _vector(fit: PosteriorFit, number: ReportedNumber) -> NDArray[np.float64]:
     return np.array([number.gradient.get(name, 0.0) for name in fit.names])
 
 
-def _budget(fit: PosteriorFit, stage: Stage, number: ReportedNumber) -> Budget:
-    """Split the posterior variance gᵀCg = gᵀC(H + Λ)Cg by the priors: Λ is diagonal."""
-    spread = stage.covariance @ _vector(fit, number)
+def _budget(fit: PosteriorFit, number: ReportedNumber) -> tuple[float, float, dict[str, float]]:
+    """Split the posterior variance gᵀCg = gᵀC(H + Λ)Cg by the priors, as Λ is diagonal.
+
+    Returns record, timing and sources of `Estimated`.
+    """
+    spread = fit.covariance @ _vector(fit, number)
     total = float(_vector(fit, number) @ spread)
     shares = fit.precision * spread**2
     sources = {
@@ -168,7 +268,7 @@ def _budget(fit: PosteriorFit, stage: Stage, number: ReportedNumber) -> Budget:
     }
     timing = sum(sources.get(name, 0.0) ** 2 for name in TIMING)
     rest = max(total - timing, 0.0) + number.definition**2
-    return Budget(math.sqrt(rest), math.sqrt(timing), sources, math.sqrt(timing))
+    return math.sqrt(rest), math.sqrt(timing), sources
 
 
 def _deviation(fit: PosteriorFit, number: ReportedNumber) -> float:
@@ -177,15 +277,14 @@ def _deviation(fit: PosteriorFit, number: ReportedNumber) -> float:
     Where the stem swings, or slips between two samples, F_v is taken to be unknown by k·τ, for
     which a lag τ compensates.
     """
-    stage = fit.stages[-1]
     gradient = _vector(fit, number)
-    variance = float(gradient @ stage.covariance @ gradient) + number.definition**2
+    variance = float(gradient @ fit.covariance @ gradient) + number.definition**2
     variance -= float(gradient @ fit.along_lag) ** 2 * fit.lag_variance
     if "delay" in fit.names:
-        lag = fit.precision[fit.names.index("delay")] ** -0.5 if _swings(stage) else 0.0
-        lag = math.hypot(lag, _unseen_moment(fit) if stage.at["slip_force"] > 0.0 else 0.0)
+        lag = fit.precision[fit.names.index("delay")] ** -0.5 if _swings(fit) else 0.0
+        lag = math.hypot(lag, _unseen_moment(fit) if fit.at["slip_force"] > 0.0 else 0.0)
         viscous = number.gradient.get("viscous_friction", 0.0)
-        variance += (viscous * stage.at["spring_constant"] * lag) ** 2
+        variance += (viscous * fit.at["spring_constant"] * lag) ** 2
     left = abs(float(gradient @ _possible(fit))) / NORMAL_QUANTILE
     return math.hypot(math.sqrt(max(variance, 0.0)), left)
 
@@ -202,38 +301,15 @@ def _unseen_moment(fit: PosteriorFit) -> float:
     return 0.5 * RECTANGLE * period / math.sqrt(strokes)
 
 
-def _swings(stage: Stage) -> bool:
+def _swings(fit: PosteriorFit) -> bool:
     """Return whether F_v is so small that the stem swings, and the linear model means little."""
-    return stage.at["viscous_friction"] < SWINGING * stage.at["spring_constant"]
+    return fit.at["viscous_friction"] < SWINGING * fit.at["spring_constant"]
 
 
 def _possible(fit: PosteriorFit) -> NDArray[np.float64]:
     """Return the remaining step, bounded so that it changes no force by more than a third."""
     bounds = np.array([0.3 * abs(fit.at[n]) if n in MAIN else math.inf for n in fit.names])
     return np.clip(fit.remaining, -bounds, bounds)
-
-
-class Doubt(Enum):
-    """Why a simulated stem determines no more than the force balance does."""
-
-    MISFIT = auto()
-    LAG = auto()
-    UNTRIED = auto()
-
-
-def doubt_of(fits: Sequence[PosteriorFit], profile: Profile = Profile.PLANT) -> Doubt | None:
-    """Return why the best fit does not follow the record of a plant, or None where it does.
-
-    Its residual exceeds noise, its lag is impossible, or the search could not trade viscous
-    friction for lag while both are unknown.
-    """
-    best = fits[0]
-    if best.inflation > NOT_QUITE and profile.has_imperfections:
-        return Doubt.MISFIT
-    if abs(best.lag) >= LARGEST_LAG:
-        return Doubt.LAG
-    knows = "viscous_friction" not in best.names or not set(TIMING) & set(best.names)
-    return None if len(fits) > 1 or knows else Doubt.UNTRIED
 
 
 def estimated(
@@ -252,16 +328,11 @@ def estimated(
     fit, profile = fits[0], LagProfile.of(fits)
     late = _least_viscous(fits, numbers_at)
     if profile is None:
-        here = numbers_at(fit.model, fit.at)
-        found = {
-            name: Estimated(
-                one.value,
-                NORMAL_QUANTILE * _deviation(fit, one),
-                _budget(fit, fit.stages[-1], one),
-                late.get(name, one).value,
-            )
-            for name, one in here.items()
-        }
+        found = {}
+        for name, here in numbers_at(fit.model, fit.at).items():
+            record, timing, sources = _budget(fit, here)
+            width, rival = NORMAL_QUANTILE * _deviation(fit, here), late.get(name, here).value
+            found[name] = Estimated(here.value, width, record, timing, sources, timing, rival)
     else:
         found = _over_lags(profile, numbers_at, lag or LagPrior(), late)
     for name, one in found.items():
@@ -271,7 +342,7 @@ def estimated(
             width = math.hypot(width, _LOST * lost * abs(one.value))
             loop = loop_friction(fit.model, fit.at)
             apart = abs(loop - one.value)
-            unlike = fit.inflation > NOT_QUITE or fit.stages[-1].penalty > UNLIKELY
+            unlike = fit.inflation > NOT_QUITE or fit.penalty > UNLIKELY
             unlike &= bool(fit.lags.any())
             if unlike or apart > _FAR * abs(loop):
                 width = math.hypot(width, apart + _LOOP * abs(one.value))
@@ -287,7 +358,7 @@ def _over_lags(
     late: Mapping[str, ReportedNumber],
 ) -> dict[str, Estimated]:
     """Integrate each number of the likeliest fit over the lag."""
-    best, stage = profile.best, profile.best.stages[-1]
+    best = profile.best
     places = {fit: numbers_at(fit.model, fit.at) for fit in (*profile.fits, *profile.apart)}
     prior = lag if lag.deviation is None else LagPrior(math.inf)
     probability = prior.probability(profile.log_likelihood)
@@ -303,13 +374,9 @@ def _over_lags(
         record = min(math.sqrt(float(probability @ own**2)), half_width / NORMAL_QUANTILE)
         timing = math.sqrt(float(probability @ (values - mean) ** 2))
         timing = share_of_timing(half_width, record, timing)
-        budget = Budget(
-            record,
-            timing,
-            _budget(best, stage, first).sources,
-            timing * math.sqrt(max(unsaid, 0.0)),
-        )
-        found[name] = Estimated(mean, half_width, budget, late.get(name, first).value)
+        _, _, sources = _budget(best, first)
+        shared, rival = timing * math.sqrt(max(unsaid, 0.0)), late.get(name, first).value
+        found[name] = Estimated(mean, half_width, record, timing, sources, shared, rival)
     return found
 
 
@@ -326,7 +393,7 @@ def _least_viscous(
         for fit in fits
         if fit.is_apart
         and fit.inflation <= _FOLLOWS * best.inflation
-        and fit.stages[-1].penalty < best.stages[-1].penalty + UNLIKELY
+        and fit.penalty < best.penalty + UNLIKELY
     ]
     last = min((best, *able), key=lambda fit: fit.at["viscous_friction"])
     return numbers_at(last.model, last.at)

@@ -23,7 +23,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from valve_friction_ros.identification.engine.imperfections import TIMING
+from valve_friction_ros.identification.engine.coordinates import TIMING
 from valve_friction_ros.identification.engine.posterior_fit import PosteriorFit
 from valve_friction_ros.identification.settings import TIMING_UNCERTAINTY
 from valve_friction_ros.identification.trust.uncertainty import CONFIDENCE, NORMAL_QUANTILE
@@ -70,11 +70,8 @@ _NEGLIGIBLE, _HALVINGS = 1e-6, 24
 class LagPrior:
     """Prior of the time by which the stem is seen late.
 
-    Attributes
-    ----------
-    deviation : float or None
-        Standard deviation of a Gaussian, s; None for the heavy-tailed prior of a plant without a
-        stated timing.
+    A Gaussian of this deviation, s; with None the heavy-tailed prior of a plant without a stated
+    timing.
     """
 
     deviation: float | None = None
@@ -130,12 +127,7 @@ def mixture_half_width(
 ) -> float:
     """Return half the width of the interval about the centre that holds `CONFIDENCE`.
 
-    Parameters
-    ----------
-    weights, values, deviations : ndarray of float, of one shape
-        Of each normal distribution of a mixture; the weights add up to one.
-    centre : float, optional
-        By default the mean.
+    The weights of the normal distributions add up to one; the centre is their mean by default.
     """
     if centre is None:
         centre = float(np.sum(weights * values))
@@ -170,16 +162,10 @@ def spread_of(density: _Array) -> float:
 
 @dataclass(frozen=True, eq=False)
 class LagProfile:
-    """Likelihood of the lag, from fits that are held at several lags.
+    """Likelihood of the lag, from fits that are held at several lags, in that order.
 
-    Attributes
-    ----------
-    fits : sequence of PosteriorFit
-        In the order of their lags.
-    apart : sequence of PosteriorFit
-        Fits to which no valley leads from the others.
-    inflation : float
-        Inflation of the residual of the best fit, by which all fits are compared.
+    No valley leads from these to the fits `apart`. All are compared by the `inflation` of the
+    residual of the best fit.
     """
 
     fits: Sequence[PosteriorFit]

@@ -19,7 +19,9 @@ from typing import NamedTuple
 import numpy as np
 
 from valve_friction_ros.identification.drawing import FRICTION_CURVE, IMPERFECTIONS_FOUND
+from valve_friction_ros.identification.engine import verdicts
 from valve_friction_ros.identification.engine.balance_regression import SECOND_ORDER
+from valve_friction_ros.identification.engine.coordinates import Profile
 from valve_friction_ros.identification.engine.departures import Departed, static_friction
 from valve_friction_ros.identification.engine.fitted_record import fitted_record
 from valve_friction_ros.identification.engine.friction_curve import (
@@ -30,36 +32,19 @@ from valve_friction_ros.identification.engine.friction_curve import (
     friction_curves,
     timed_numbers,
 )
-from valve_friction_ros.identification.engine.imperfections import Profile
 from valve_friction_ros.identification.engine.intervals import (
+    ASYMMETRY,
     Estimated,
     NumbersAt,
-    doubt_of,
     estimated,
-)
-from valve_friction_ros.identification.engine.lags import LagPrior, LagProfile
-from valve_friction_ros.identification.engine.moving_part import moving_part
-from valve_friction_ros.identification.engine.numbers import (
-    ASYMMETRY,
     found_sizes,
     reported_numbers,
 )
+from valve_friction_ros.identification.engine.lags import LagPrior, LagProfile
+from valve_friction_ros.identification.engine.moving_part import MovingPart, moving_part
 from valve_friction_ros.identification.engine.posterior_fit import PosteriorFit
-from valve_friction_ros.identification.engine.remarks import sampling_remarks
-from valve_friction_ros.identification.engine.search import Prior, search
-from valve_friction_ros.identification.engine.sentences import (
-    by_departures,
-    by_stretch,
-    found_imperfections,
-    main_doubt,
-)
-from valve_friction_ros.identification.engine.verdicts import (
-    curve_misfit,
-    curve_verdicts,
-    fit_misfit,
-    fit_verdicts,
-)
-from valve_friction_ros.identification.published.method import (
+from valve_friction_ros.identification.engine.search import Prior, posteriors_at, search
+from valve_friction_ros.identification.published.identify import (
     published_beside,
     sweep_evidence,
     sweep_finding,
@@ -69,19 +54,11 @@ from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.identification.result import Result, StemComparison
 from valve_friction_ros.identification.settings import (
     REGRESSED,
+    SLIDING,
+    UNITS,
     IdentificationSettings,
 )
-from valve_friction_ros.identification.trust.excitation import (
-    require_changing_drive,
-    require_drive,
-    require_enough_samples,
-    require_motion,
-    require_related_signals,
-    require_two_directions,
-    require_unbroken,
-    require_within_travel,
-)
-from valve_friction_ros.identification.trust.misfit import Misfit, stem_distance
+from valve_friction_ros.identification.trust import excitation
 from valve_friction_ros.identification.trust.plausible_units import (
     require_plausible_units,
     time_remarks,
@@ -95,13 +72,12 @@ from valve_friction_ros.identification.trust.uncertainty import (
 from valve_friction_ros.identification.trust.verdict import (
     BUDGET,
     COVERAGE,
-    WEAK_SHARE,
+    Misfit,
     Parameter,
     Verdict,
-    interval_share,
-    with_verdict,
+    calibration_share,
+    stem_distance,
 )
-from valve_friction_ros.identification.units import SLIDING
 from valve_friction_ros.model.recording import Recording, StampedRecord, StampedSignal
 from valve_friction_ros.model.valve import KarnoppParameters, Valve
 from valve_friction_ros.signals import MeasuredRecord, as_sent_on_change, measured
@@ -163,21 +139,6 @@ def identify_bench(
 
     Like `identify_plant`, without imperfections. The signals are synchronous to the stated timing
     uncertainty, and exactly where none is stated. The intervals hold only as far as that is true.
-
-    Parameters
-    ----------
-    recording, valve, settings
-        As for `identify_plant`.
-
-    Returns
-    -------
-    Result
-        Parameters with intervals and verdicts.
-
-    Raises
-    ------
-    RefusalError
-        If the record does not determine the friction; the message names cause and remedy.
     """
     return _identified(recording, valve, settings or IdentificationSettings(), Profile.BENCH)
 
@@ -200,10 +161,10 @@ def _identified(
     balanced, departed = curve_numbers(curves), None
     if settings.fixed.get("spring_constant") != 0.0:
         departed = static_friction(record, valve, balanced, lag)
-    known = _Beforehand(curves, balanced, departed)
+    static = math.nan if departed is None else departed.static_friction.value
     try:
-        require_related_signals(uniform)
-        outcome = _of_simulation(record, valve, settings, profile, known)
+        excitation.require_related_signals(uniform)
+        outcome = _of_simulation(record, valve, settings, profile, curves, balanced, static)
     except RefusalError as refusal:
         if not _dissipates(balanced):
             raise
@@ -226,13 +187,13 @@ def _identified(
             *time_remarks(uniform, valve),
             *_doubts(misfit),
             *outcome.warnings,
-            *sampling_remarks(record),
+            *verdicts.sampling_remarks(record),
             *beside,
         ),
         evidence={
             **({} if published is None else sweep_evidence(published)),
             BUDGET: {
-                name: {"record": one.budget.record, "timing": one.budget.timing}
+                name: {"record": one.record, "timing": one.timing}
                 for name, one in outcome.numbers.items()
             },
             IMPERFECTIONS_FOUND: {
@@ -246,7 +207,7 @@ def _identified(
         },
         findings=(
             *outcome.findings,
-            *((by_stretch(part.duration, part.motion),) if part.is_stretch else ()),
+            *_of_stretch(part),
             *_left_to_published(settings),
             *(() if published is None else (sweep_finding(published),)),
         ),
@@ -254,6 +215,16 @@ def _identified(
         exhibit=published,
         stem=None if outcome.stem is None else outcome.stem._replace(pauses=part.pauses),
         sliding_speed=outcome.sliding_speed,
+    )
+
+
+def _of_stretch(part: MovingPart) -> tuple[str, ...]:
+    """Say how much of the motion in a long record was used."""
+    if not part.is_stretch:
+        return ()
+    return (
+        f"used the {part.duration / 60:.3g} min with the most stem travel out of "
+        f"{part.motion / 60:.3g} min of motion",
     )
 
 
@@ -290,33 +261,25 @@ class _Outcome(NamedTuple):
     stem: StemComparison | None = None
 
 
-class _Beforehand(NamedTuple):
-    """Results from the record without a simulation."""
-
-    curves: Sequence[FrictionCurve]
-    balanced: Mapping[str, Estimated]
-    departed: Departed | None
-
-
 def _of_simulation(
     record: StampedRecord,
     valve: Valve,
     settings: IdentificationSettings,
     profile: Profile,
-    known: _Beforehand,
+    curves: Sequence[FrictionCurve],
+    balanced: Mapping[str, Estimated],
+    static: float,
 ) -> _Outcome:
     """Simulate the stem by the profile; the friction curve is its start and its check."""
-    curves, balanced, departed = known
     if settings.fixed.get("spring_constant") == 0.0:
         raise RefusalError(
             "the forces with and against the motion do not differ significantly: check that both "
             "signals belong to this machine, and that it has no spring"
         )
     prior = prior_of(settings, profile, valve)
-    static = math.nan if departed is None else departed.static_friction.value
     fits = search(fitted_record(record, valve), prior, curves, static)
     fit, numbers = fits[0], estimated(fits, numbers_of(profile), prior.lag)
-    misfit = fit_misfit(fit, numbers, profile)
+    misfit = verdicts.fit_misfit(fit, numbers, profile)
     if misfit.is_gross:
         raise RefusalError(
             f"no friction model reproduces the record (fit {100 * misfit.fit:.0f} %, "
@@ -325,16 +288,19 @@ def _of_simulation(
             "if the packing was changed during the record, clear the buffer and record again"
         )
     if profile.has_imperfections:
-        follows = doubt_of(fits) is None
+        follows = not verdicts.split_doubt(fits, misfit, profile)
         if follows:
             balanced = timed_numbers(curves, LagProfile.of(fits))
         numbers = checked_by_curve(numbers, balanced, follows, fit.at["slip_force"])
         if "mass" in numbers and not prior.lag.is_known:
-            numbers["mass"] = _beside_lags(numbers["mass"], fit.at["spring_constant"])
-        misfit = fit_misfit(fit, numbers)
+            # Seen late by τ, a spring seems to have the mass k·τ²/2: what a shift leaves of a lag.
+            by_lags = fit.at["spring_constant"] * SECOND_ORDER**2
+            mass = numbers["mass"]
+            numbers["mass"] = replace(mass, half_width=math.hypot(mass.half_width, by_lags))
+        misfit = verdicts.fit_misfit(fit, numbers)
     imperfections = estimated(fits, found_sizes, prior.lag)
     return _Outcome(
-        parameters=fit_verdicts(fits, numbers, settings, misfit, profile),
+        parameters=verdicts.fit_verdicts(fits, numbers, settings, misfit, profile),
         numbers=numbers,
         misfit=misfit,
         sliding_speed=_sliding_speed(fit, curves),
@@ -343,7 +309,7 @@ def _of_simulation(
             f"{stem_distance(misfit.rms, valve)}, of which "
             f"{two_digits(misfit.systematic * 1e6)} µm is more than noise",
         ),
-        warnings=found_imperfections(fit, imperfections["lag"]),
+        warnings=verdicts.found_imperfections(fit, imperfections["lag"]),
         imperfections=imperfections,
         correlation=_correlation(fit, numbers_of(profile)),
         model=_model(fit),
@@ -359,15 +325,7 @@ def _correlation(fit: PosteriorFit, numbers_at: NumbersAt) -> Correlation:
         for name, one in numbers.items()
     }
     own = {name: one.definition**2 for name, one in numbers.items()}
-    return correlation_of(gradients, fit.stages[-1].covariance, own)
-
-
-def _beside_lags(mass: Estimated, spring: float) -> Estimated:
-    """Widen the mass by the effect of lags: seen late by τ, a spring seems to have the mass k·τ²/2.
-
-    That is what a shift by a lag leaves of it, beside the elastic creep of a packing.
-    """
-    return replace(mass, half_width=math.hypot(mass.half_width, spring * SECOND_ORDER**2))
+    return correlation_of(gradients, fit.covariance, own)
 
 
 def _with_departures(outcome: _Outcome, departed: Departed | None) -> _Outcome:
@@ -377,16 +335,14 @@ def _with_departures(outcome: _Outcome, departed: Departed | None) -> _Outcome:
     if departed is None or known.verdict in (Verdict.IDENTIFIED, Verdict.FIXED):
         return outcome
     one = departed.static_friction
-    width, share = one.half_width, one.half_width / one.value
-    words = interval_share(one.value, share)
-    reason = main_doubt(one.budget, words) if share > WEAK_SHARE else ""
     return outcome._replace(
-        parameters={
-            **outcome.parameters,
-            name: with_verdict(name, one.value, width / COVERAGE, width, reason),
-        },
+        parameters={**outcome.parameters, name: verdicts.judged(name, one, one.half_width)},
         numbers={**outcome.numbers, name: one},
-        findings=(*outcome.findings, by_departures(departed.departures)),
+        findings=(
+            *outcome.findings,
+            f"the static friction is taken from {departed.departures} breakaways of the stem from "
+            "rest",
+        ),
     )
 
 
@@ -413,13 +369,13 @@ def _of_force_balance(
     """Use the force balance of the sliding stem alone; `why` says why no stem was simulated."""
     numbers = {name: one for name, one in numbers.items() if name != SPEED_EXPONENT}
     best = next(one for one in curves if one.numbers[SLIDING].value == numbers[SLIDING].value)
-    misfit = curve_misfit(best, numbers[SLIDING])
+    misfit = verdicts.curve_misfit(best, numbers[SLIDING])
     reproduced = f"the force balance reproduces {100 * misfit.fit:.2f} % of the force"
     beyond = (
         f"; {misfit.words} of the residual is more than noise" if misfit.systematic > 0.0 else ""
     )
     return _Outcome(
-        parameters=curve_verdicts(numbers, settings, best.stribeck_velocity, force_range),
+        parameters=verdicts.curve_verdicts(numbers, settings, best.stribeck_velocity, force_range),
         numbers=numbers,
         misfit=misfit,
         sliding_speed=best.sliding_speed,
@@ -437,22 +393,16 @@ def require_moving_stem(
     has_own_stamps: bool = False,
 ) -> None:
     """Refuse a record whose stem does not move both ways within the travel."""
-    require_drive(record, valve)
+    excitation.require_drive(record, valve)
     require_plausible_units(record, valve, settings)
     window = settings.published_window
     if has_own_stamps:
         window = int(np.clip(len(record) // _WINDOWS, _SHORTEST_WINDOW, window))
-    require_enough_samples(record, window)
-    require_motion(record)
-    require_two_directions(record, window, valve.travel)
-    require_within_travel(record, valve)
-    require_changing_drive(record)
-
-
-def require_record(record: MeasuredRecord, valve: Valve, settings: IdentificationSettings) -> None:
-    """Refuse a record in which the stem does not move both ways, or not with the drive."""
-    require_moving_stem(record, valve, settings)
-    require_related_signals(record)
+    excitation.require_enough_samples(record, window)
+    excitation.require_motion(record)
+    excitation.require_two_directions(record, window, valve.travel)
+    excitation.require_within_travel(record, valve)
+    excitation.require_changing_drive(record)
 
 
 def stamped_record(recording: Recording) -> StampedRecord:
@@ -463,7 +413,7 @@ def stamped_record(recording: Recording) -> StampedRecord:
             drive=as_sent_on_change(stamped.drive),
             position=as_sent_on_change(stamped.position),
         )
-    require_unbroken(recording)
+    excitation.require_unbroken(recording)
     time = recording.time
     return StampedRecord(
         StampedSignal(time, recording.drive),
@@ -509,14 +459,9 @@ def _balanced_model(
     """Return the Karnopp model of a force balance; None where one of its numbers is impossible."""
     values = {name: one.value for name, one in numbers.items()} | known_of(settings)
     try:
-        return KarnoppParameters(
-            mass=values.get("mass", settings.assumed_mass),
-            viscous_friction=values["viscous_friction"],
-            coulomb_friction=values["coulomb_friction"],
-            static_friction=values.get("static_friction", values["coulomb_friction"]),
-            spring_constant=values["spring_constant"],
-            spring_preload=values["spring_preload"],
-        )
+        values.setdefault("mass", settings.assumed_mass)
+        values.setdefault("static_friction", values["coulomb_friction"])
+        return KarnoppParameters(**{name: values[name] for name in UNITS})
     except (KeyError, ValueError):
         return None
 
@@ -552,14 +497,72 @@ def _stem(fit: PosteriorFit, stamped: StampedRecord) -> StemComparison:
 
 def _model(fit: PosteriorFit) -> KarnoppParameters:
     """Return the Karnopp model without its imperfections."""
-    at = fit.at
-    return KarnoppParameters(
-        mass=at["mass"],
-        viscous_friction=at["viscous_friction"],
-        coulomb_friction=at["coulomb_friction"],
-        static_friction=at["coulomb_friction"] + at["slip_force"],
-        spring_constant=at["spring_constant"],
-        spring_preload=at["spring_preload"],
-        limit_velocity=at["limit_velocity"],
-        stribeck_velocity=at["stribeck_velocity"],
+    values = {name: fit.at[name] for name in (*REGRESSED, "limit_velocity", "stribeck_velocity")}
+    static = fit.at["coulomb_friction"] + fit.at["slip_force"]
+    return KarnoppParameters(**values, static_friction=static)
+
+
+def expected_half_widths(
+    recording: Recording,
+    valve: Valve,
+    parameters: KarnoppParameters,
+    settings: IdentificationSettings | None = None,
+    *,
+    start: float,
+    with_competitors: bool = True,
+) -> Mapping[str, float]:
+    """Return the half widths of the 95 % intervals to expect from a simulated record.
+
+    They are those of the posterior (HᵀW²H/κ + Λ)⁻¹ at the simulated valve itself: the sensitivities
+    H of the exact simulation, the noise W of both sensors, and the priors Λ of the imperfections
+    with which `identify_plant` fits, including lags of the signals. No search is run.
+
+    Parameters
+    ----------
+    recording, valve, parameters
+        Simulated with the noise of the sensors, from this valve with these parameters.
+    settings : IdentificationSettings, optional
+        Settings of the identification.
+    start : float
+        Simulated position at the first sample, m.
+    with_competitors : bool
+        Whether to include models that explain the record by a lag in place of viscous friction;
+        that takes some ten times as long, and matters most for F_v.
+
+    Raises
+    ------
+    RefusalError
+        If the method would refuse the record.
+    """
+    settings = settings or IdentificationSettings()
+    require_moving_stem(measured(recording), valve, settings)
+    excitation.require_related_signals(measured(recording))
+    truth = {
+        "coulomb_friction": parameters.coulomb_friction,
+        "viscous_friction": parameters.viscous_friction,
+        "spring_constant": parameters.spring_constant,
+        "spring_preload": parameters.spring_preload,
+        "slip_force": parameters.static_friction - parameters.coulomb_friction,
+        "mass": parameters.mass,
+        "start_position": start,
+    }
+    stamped = stamped_record(recording)
+    fits = posteriors_at(
+        fitted_record(stamped, valve), prior_of(settings, valve=valve), truth, with_competitors
     )
+    numbers: Mapping[str, Estimated] = estimated(fits, lag=lag_prior_of(settings))
+    if with_competitors:
+        curves = friction_curves(stamped, valve, lag_prior_of(settings), known_of(settings))
+        numbers = checked_by_curve(
+            numbers,
+            timed_numbers(curves, LagProfile.of(fits)),
+            follows=True,
+            slip_force=truth["slip_force"],
+        )
+    return {
+        name: math.hypot(
+            one.half_width,
+            COVERAGE * calibration_share(name, settings, valve.driven_by) * one.value,
+        )
+        for name, one in numbers.items()
+    }

@@ -46,16 +46,10 @@ _SAME_NOISE, _SAME_SHARE = 2.0, 2e-3
 
 
 class MovingPart(NamedTuple):
-    """The part of a record that is fitted.
+    """The part of a record that is fitted, and the rests that were left out of it.
 
-    Attributes
-    ----------
-    record : StampedRecord
-        Samples, each shifted earlier by the pauses that were left out before it.
-    pauses : tuple of Pause
-        Rests that were left out, on the time of `record`.
-    motion : float
-        Time of the motion in the whole record, s; 0 where no rest was looked for.
+    Each sample of the `record` is shifted earlier by the `pauses` before it, which are on that
+    time. `motion` is the time of the motion in the whole record, s; 0 where no rest was looked for.
     """
 
     record: StampedRecord
@@ -123,17 +117,11 @@ def _between(record: StampedRecord, begin: float, end: float) -> StampedRecord:
 
 
 class _Windows(NamedTuple):
-    """Equal windows of a record, and the motion of the stem in each.
+    """Equal windows of a record between `edges`, s, and the motion of the stem in each.
 
-    Attributes
-    ----------
-    edges : ndarray of float, shape (w + 1,)
-        Their limits, s.
-    mean, range : ndarray of float, shape (w,)
-        Mean of the positions and distance between the extreme ones, m. A window without a sample
-        has the mean of the one before it.
-    noise, span : float
-        Deviation of the noise, and the range of all positions, m.
+    The mean of the positions, and the distance between the extreme ones, m; a window without a
+    sample has the mean of the one before it. `noise` is their deviation, `span` the range of all of
+    them, m.
     """
 
     edges: NDArray[np.float64]

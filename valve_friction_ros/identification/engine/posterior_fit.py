@@ -9,6 +9,7 @@
 
 """Most probable coordinates of a model with priors, and their remaining uncertainty."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -18,13 +19,14 @@ from numpy.typing import NDArray
 
 from valve_friction_ros.identification.engine.broad_model import BroadModel
 from valve_friction_ros.identification.engine.coordinates import (
+    BOUNDS,
+    TIMING,
     Coordinates,
     jacobian,
     physical,
     straight,
 )
-from valve_friction_ros.identification.engine.imperfections import BOUNDS, TIMING
-from valve_friction_ros.identification.engine.weights import inflation, stroke_cells
+from valve_friction_ros.identification.engine.fitted_record import inflation, stroke_cells
 
 _ROUNDS = 12
 _ROUNDING = 1e-9
@@ -35,22 +37,10 @@ def bounded_minimum(
 ) -> NDArray[np.float64]:
     """Minimise q'·A·q/2 − b'·q under q ≥ `lowest`, by an active set.
 
-    A coordinate that would leave its range is held at its bound, and the others are solved again; a
-    held coordinate is released where the form falls inwards, for half of the rounds at most.
-
-    Parameters
-    ----------
-    curvature : ndarray of float, shape (p, p)
-        A, positive semi-definite, with a diagonal of about one.
-    slope : ndarray of float, shape (p,)
-        b.
-    lowest : ndarray of float, shape (p,)
-        At most zero; minus infinity where there is no bound.
-
-    Returns
-    -------
-    ndarray of float, shape (p,)
-        q.
+    The `curvature` A is positive semi-definite, with a diagonal of about one, and b is the `slope`;
+    `lowest` is at most zero, minus infinity without a bound. A coordinate that would leave its
+    range is held at its bound, and the others are solved again; a held coordinate is released where
+    the form falls inwards, for half of the rounds at most.
     """
     free = np.ones(slope.size, dtype=np.bool_)
     q = np.zeros_like(slope)
@@ -98,56 +88,26 @@ _MOVED = ("coulomb_friction", "viscous_friction", "spring_constant", "spring_pre
 
 
 @dataclass(frozen=True, eq=False)
-class Stage:
-    """A point that the fit has passed.
-
-    Attributes
-    ----------
-    at : mapping of str to float
-        All coordinates.
-    covariance : ndarray of float, shape (p, p)
-        Posterior covariance of the free coordinates, with the model linearised there.
-    misfit : float
-        Sum of the squared residuals over their effective variances, not inflated.
-    penalty : float
-        Sum of the squared distances from the priors over their variances.
-    """
-
-    at: Coordinates
-    covariance: NDArray[np.float64] = field(repr=False)
-    misfit: float
-    penalty: float
-
-
-@dataclass(frozen=True, eq=False)
 class PosteriorFit:
-    """The end of a fit.
+    """The end of a fit of the free coordinates, `names`, at a place of all coordinates.
 
-    Attributes
-    ----------
-    model : BroadModel
-        The model.
-    names : tuple of str
-        The free coordinates.
-    stages : tuple of Stage
-        All points that it has passed; the last is the end.
-    inflation : float
-        Inflation of the residual at the end.
-    precision : ndarray of float, shape (p,)
-        One over the variance of each prior, 0 without one.
-    remaining : ndarray of float, shape (p,)
-        Step that the linear model would still take.
-    residual : ndarray of float, shape (c,)
-        Measured minus simulated readings, m, the mean of both halves.
-    kept : tuple of str
-        Free coordinates that stay where their priors are centred, and widen the intervals only.
-    is_apart : bool
-        Whether no valley leads to it from the best fit.
+    The covariance is that of the free coordinates, with the model linearised there; `misfit` is the
+    sum of the squared residuals over their effective variances, not inflated, `penalty` that of the
+    squared distances from the priors over their variances, and `steps` the number of points passed.
+    The `inflation` is that of the residual, `precision` one over the variance of each prior (0
+    without one), `remaining` the step that the linear model would still take, and `residual`
+    measured minus simulated readings, m, the mean of both halves. Coordinates that are `kept` stay
+    where their priors are centred, and only widen the intervals. No valley leads from the best fit
+    to one that `is_apart`.
     """
 
     model: BroadModel
     names: tuple[str, ...]
-    stages: tuple[Stage, ...] = field(repr=False)
+    at: Coordinates = field(repr=False)
+    covariance: NDArray[np.float64] = field(repr=False)
+    misfit: float
+    penalty: float
+    steps: int
     inflation: float
     precision: NDArray[np.float64] = field(repr=False)
     remaining: NDArray[np.float64] = field(repr=False)
@@ -156,18 +116,20 @@ class PosteriorFit:
     is_apart: bool = False
 
     @property
-    def at(self) -> Coordinates:
-        """Coordinates at the end."""
-        return self.stages[-1].at
-
-    @property
     def objective(self) -> float:
         """Sum of the squares of residuals and of distances from the priors."""
-        return self.stages[-1].misfit + self.stages[-1].penalty
+        return self.misfit + self.penalty
 
     def cost(self, inflation: float) -> float:
         """Return the objective with the squares of residuals divided by an inflation."""
-        return self.stages[-1].misfit / inflation + self.stages[-1].penalty
+        return self.misfit / inflation + self.penalty
+
+    def deviation(self, name: str) -> float:
+        """Return the deviation of a coordinate by the linear model at the end; 0 if it is held."""
+        if name not in self.names:
+            return 0.0
+        index = self.names.index(name)
+        return math.sqrt(max(float(self.covariance[index, index]), 0.0))
 
     @property
     def plain_misfit(self) -> float:
@@ -187,12 +149,12 @@ class PosteriorFit:
     @property
     def lag_variance(self) -> float:
         """Variance of the lag by the linear model at the end, s²."""
-        return max(float(self.lags @ self.stages[-1].covariance @ self.lags), 0.0)
+        return max(float(self.lags @ self.covariance @ self.lags), 0.0)
 
     @property
     def along_lag(self) -> NDArray[np.float64]:
         """Change of each free coordinate per second of lag, by the same model, shape (p,)."""
-        along = self.stages[-1].covariance @ self.lags
+        along = self.covariance @ self.lags
         return np.asarray(along / max(float(self.lags @ along), np.finfo(float).tiny))
 
 
@@ -280,16 +242,12 @@ class _Problem:
         lowest = [BOUNDS.get(name, -np.inf) - self.straight[name] for name in names]
         self.lowest = np.minimum(np.array(lowest) * self.scale, 0.0)
 
-    def stage(self) -> Stage:
+    def covariance(self) -> NDArray[np.float64]:
+        """Posterior covariance of the free coordinates, with the model linearised here."""
         values, vectors = np.linalg.eigh(self.curvature)
         seen = np.maximum(values, _UNSEEN * max(float(values[-1]), 1.0))
         inverse = (vectors / seen) @ vectors.T / np.outer(self.scale, self.scale)
-        return Stage(
-            self.at,
-            self.jacobian @ inverse @ self.jacobian.T,
-            _misfit(self.model, self.residual),
-            self.penalty(self.at),
-        )
+        return np.asarray(self.jacobian @ inverse @ self.jacobian.T)
 
     def step(self, damping: float) -> NDArray[np.float64]:
         damped = self.curvature + damping * np.eye(self.scale.size)
@@ -382,26 +340,13 @@ def fit(
     from the even samples of the pressure, the other from the odd samples, whose noise is
     independent.
 
-    Parameters
-    ----------
-    model : BroadModel
-        The model.
-    start : mapping of str to float
-        All coordinates.
-    names : tuple of str
-        The free coordinates.
-    deviations : mapping of str to float
-        Standard deviations of the priors; without one a coordinate is free.
-    centre : mapping of str to float
-        Means of the priors; 0 where none is given.
-    steps : int
-        Most steps; with 0 the posterior at `start` is returned.
-    pinned : float, optional
-        Total lag, s, that the fit keeps.
+    The coordinates `names` are free. Those without one of the `deviations` have no prior; a prior
+    without a `centre` is about 0. With 0 `steps` the posterior at `start` is returned. A fit that
+    is `pinned` keeps this total lag, s.
     """
     at = dict(start)
     problem = _Problem(model, at, names, deviations, centre, model.readings(at), pinned)
-    best, stages, risen, rises = problem, [problem.stage()], 0, 0 if pinned is None else _RISES
+    best, passed, risen, rises = problem, 1, 0, 0 if pinned is None else _RISES
     for _ in range(steps):
         if problem.gain(problem.step(0.0)) < _WORTH:
             break
@@ -409,8 +354,7 @@ def fit(
         problem = _Problem(model, move.at, names, deviations, centre, move.readings, pinned)
         risen = 0 if best.objective(move.at, move.readings) < best.here else risen + 1
         if not risen:
-            best = problem
-            stages.append(problem.stage())
+            best, passed = problem, passed + 1
         if risen > rises or abs(move.fall) < _WORTH:
             break
     problem = best
@@ -418,7 +362,11 @@ def fit(
     return PosteriorFit(
         model,
         names,
-        tuple(stages),
+        problem.at,
+        problem.covariance(),
+        _misfit(model, problem.residual),
+        problem.penalty(problem.at),
+        passed,
         problem.inflation,
         problem.precision,
         remaining,

@@ -12,22 +12,24 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from valve_friction_ros.identification.engine.broad_model import ABSENT, SWINGING, BroadModel
-from valve_friction_ros.identification.engine.coordinates import MAIN, Coordinates
+from valve_friction_ros.identification.engine.coordinates import (
+    BOUNDS,
+    MAIN,
+    TIMING,
+    Coordinates,
+    Profile,
+    deviations,
+)
 from valve_friction_ros.identification.engine.fitted_record import (
     FittedRecord,
     set_anew_at_rests,
 )
 from valve_friction_ros.identification.engine.friction_curve import FrictionCurve
-from valve_friction_ros.identification.engine.imperfections import (
-    BOUNDS,
-    TIMING,
-    Profile,
-    deviations,
-)
 from valve_friction_ros.identification.engine.intervals import NOISE_LIKE, UNLIKELY
 from valve_friction_ros.identification.engine.lags import LARGEST_LAG, LagPrior
 from valve_friction_ros.identification.engine.posterior_fit import PosteriorFit, fit, lag_of
@@ -47,19 +49,8 @@ _LEAST_VISCOUS = 0.1
 shows the way."""
 
 
-@dataclass(frozen=True)
-class Sliding:
-    """A regression over the steps at which the stem surely slides.
-
-    Attributes
-    ----------
-    friction : float
-        Sliding friction at the mean speed, N.
-    speed : float
-        Mean speed, m/s.
-    spring_constant, spring_preload : float
-        The spring.
-    """
+class Sliding(NamedTuple):
+    """Sliding friction, N, at the mean speed, m/s, and the spring of a stem that surely slides."""
 
     friction: float
     speed: float
@@ -95,8 +86,8 @@ def split(sliding: Sliding, share: float) -> dict[str, float]:
     }
 
 
-def nearest(model: BroadModel, starts: Sequence[Coordinates]) -> list[Coordinates]:
-    """Sort starts by the distance of their simulated stem from the measured one.
+def nearest(model: BroadModel, starts: Sequence[Coordinates]) -> Coordinates:
+    """Return the start whose simulated stem is nearest to the measured one.
 
     The distance is a mean magnitude: a single jump at the wrong time says little about a start.
     """
@@ -105,12 +96,7 @@ def nearest(model: BroadModel, starts: Sequence[Coordinates]) -> list[Coordinate
         residual = model.record.position - model.readings(start)
         return float(np.sum(np.abs(residual * model.weights)))
 
-    return sorted(starts, key=distance)
-
-
-def splits(regressed: Sliding, base: Coordinates) -> list[Coordinates]:
-    """Return starts that split the sliding friction in several ways."""
-    return [{**base, **split(regressed, share)} for share in _DRY_SHARES]
+    return min(starts, key=distance)
 
 
 def lagging(at: Coordinates, timing_uncertainty: float) -> list[Coordinates]:
@@ -182,19 +168,9 @@ _MORE_STEPS = 12
 class Prior:
     """Prior knowledge of a valve and its signals.
 
-    Attributes
-    ----------
-    lag : LagPrior
-        Prior of the time by which the stem is seen late.
-    mass : float
-        Expected mass, kg.
-    fixed : mapping of str to float
-        Coordinates that are known.
-    profile : Profile
-        Which imperfections are part of the fit.
-    diaphragm_area : float
-        Area, m², from which the mass of a plant may be larger than expected; 0 where there is none,
-        or the mass was stated.
+    Of the lag; of the mass, kg; of coordinates that are `fixed`; and, by the `profile`, of which
+    imperfections there are. The mass of a plant may be as large as its `diaphragm_area`, m²,
+    suggests: 0 where there is none, or the mass was stated.
     """
 
     lag: LagPrior
@@ -275,7 +251,7 @@ class _Search:
             min(steps, max(allowed, _FEWEST_STEPS)),
             pinned,
         )
-        self.work += len(found.stages) * a_step
+        self.work += found.steps * a_step
         return found
 
     def full(self, start: Coordinates, names: tuple[str, ...] = ()) -> PosteriorFit:
@@ -322,8 +298,8 @@ class _Search:
         starts = self.from_curves()
         if not starts:
             return None
-        near = nearest(self.exact, starts)[0]
-        near = nearest(self.exact, self.falling(near))[0]
+        near = nearest(self.exact, starts)
+        near = nearest(self.exact, self.falling(near))
         own = ("slip_force", "stribeck_velocity")
         first = self.fit(near, (*self.main, *own), _MORE_STEPS, self.exact)
         if not self.may_go_on:
@@ -352,7 +328,7 @@ class _Search:
         if "limit_velocity" not in self.all:
             return full
         dead = [{**full.at, "limit_velocity": speed} for speed in _LIMIT_VELOCITIES]
-        return self.full(nearest(self.model, dead)[0])
+        return self.full(nearest(self.model, dead))
 
     def demanded(self, best: PosteriorFit) -> PosteriorFit:
         """Accept a falling friction, and a slip, only where the record of a bench demands them.
@@ -367,13 +343,12 @@ class _Search:
         if "mass" in self.known:
             return best
         end = self.fit(best.at, (*best.names, "mass"), 0, self.exact)
-        (stage,) = end.stages
-        with_mass, known = stage.covariance[:, -1], float(stage.covariance[-1, -1])
+        with_mass, known = end.covariance[:, -1], float(end.covariance[-1, -1])
         wider = self.spread["mass"] ** 2 / known**2 - 1.0 / known
-        covariance = stage.covariance + wider * np.outer(with_mass, with_mass)
+        covariance = end.covariance + wider * np.outer(with_mass, with_mass)
         return replace(
             end,
-            stages=(replace(stage, covariance=covariance),),
+            covariance=covariance,
             remaining=np.append(best.remaining, 0.0),
             kept=("mass",),
         )
@@ -424,23 +399,19 @@ class _Search:
             lag = last.lag + way * step
             if not (self.may_go_on and abs(lag) < LARGEST_LAG):
                 break
-            found.append(self.held(best, last.at, lag))
+            start = self.along(best, last.at, lag)
+            found.append(self.fit(start, best.names, _PROFILE_STEPS, self.exact, lag))
             if found[-1].cost(best.inflation) - best.cost(best.inflation) < _IMPROBABLE:
                 last, step = found[-1], 2.0 * step
             elif step > _LEAST_STEP:
                 step /= 4.0
         return found
 
-    def held(self, best: PosteriorFit, at: Coordinates, lag: float) -> PosteriorFit:
-        """Fit at one lag, s, from the point to which the linear model of the best fit leads."""
-        start = self.along(best, at, lag)
-        return self.fit(start, best.names, _PROFILE_STEPS, self.exact, lag)
-
     def without_lag(self, best: PosteriorFit, at: Coordinates) -> PosteriorFit:
         """Fit without a lag, from the linear model or from viscous friction in place of the lag."""
         delayed = at["viscous_friction"] + lag_of(at) * at["spring_constant"]
         replaced = {**at, **dict.fromkeys(TIMING, 0.0), "viscous_friction": delayed}
-        start = dict(nearest(self.exact, [self.along(best, at, 0.0), replaced])[0])
+        start = dict(nearest(self.exact, [self.along(best, at, 0.0), replaced]))
         # A stem that swings has no derivatives that can be trusted.
         least = SWINGING * start["spring_constant"]
         start["viscous_friction"] = max(start["viscous_friction"], least)
@@ -509,7 +480,8 @@ class _Search:
 
     def start(self) -> Coordinates:
         """Fit few coordinates, without and with a slip, each with its likeliest lag."""
-        plain = self.lagged(splits(self.sliding, self.base), self.main)
+        splits = [{**self.base, **split(self.sliding, share)} for share in _DRY_SHARES]
+        plain = self.lagged(splits, self.main)
         if "slip_force" not in self.all:
             return plain.at
         slipping = self.slip_starts(self.base, {**self.base, **plain.at})
@@ -518,11 +490,11 @@ class _Search:
 
     def lagged(self, starts: Sequence[Coordinates], names: tuple[str, ...]) -> PosteriorFit:
         """Fit from the nearest start, and again from there with the likeliest lag."""
-        plain = self.fit(nearest(self.model, starts)[0], names, _FEW_STEPS)
+        plain = self.fit(nearest(self.model, starts), names, _FEW_STEPS)
         if not self.timing:
             return plain
         lags = [plain.at, *lagging(plain.at, self.prior.lag.deviation_of_all)]
-        near = nearest(self.model, lags)[0]
+        near = nearest(self.model, lags)
         return self.fit(near, tuple(dict.fromkeys((*names, *self.timing))), _FEW_STEPS)
 
     def smooth(self) -> PosteriorFit | None:
@@ -534,7 +506,7 @@ class _Search:
         if not starts:
             return None
         few = tuple(name for name in (*self.main, "slip_force") if name in self.all)
-        return self.full(self.fit(nearest(self.model, starts)[0], few, _FEW_STEPS).at)
+        return self.full(self.fit(nearest(self.model, starts), few, _FEW_STEPS).at)
 
     def best(self) -> PosteriorFit:
         """Return the most probable of all fits; a likely fit ends the search."""
@@ -551,7 +523,7 @@ class _Search:
         """Whether one of the fits is likely, or no other branch may be tried."""
         likely = any(
             one.inflation < _SUSPICIOUS
-            and one.stages[-1].penalty < UNLIKELY
+            and one.penalty < UNLIKELY
             and _fall_at_low_speed(one) < _SURE_FALL
             for one in fits
         )
@@ -561,7 +533,7 @@ class _Search:
 def _likeliest(fits: Sequence[PosteriorFit]) -> PosteriorFit:
     """Return the fit with the least sum of residual and prior terms, at a common inflation."""
     inflated = min(one.inflation for one in fits)
-    return min(fits, key=lambda one: one.stages[-1].misfit / inflated + one.stages[-1].penalty)
+    return min(fits, key=lambda one: one.misfit / inflated + one.penalty)
 
 
 def _lowest(fits: Sequence[PosteriorFit]) -> PosteriorFit:
@@ -587,8 +559,7 @@ def _fall_at_low_speed(fit: PosteriorFit) -> float:
     """Return by how many standard deviations the friction falls with speed, where v_s is 0."""
     if "at_low_speed" not in fit.names:
         return 0.0
-    index = fit.names.index("at_low_speed")
-    return fit.at["at_low_speed"] / math.sqrt(float(fit.stages[-1].covariance[index, index]))
+    return fit.at["at_low_speed"] / fit.deviation("at_low_speed")
 
 
 def _first_step(fit: PosteriorFit) -> float:
@@ -618,10 +589,7 @@ def search(
     along the lag, for which viscous friction compensates, and to its two ends: viscous friction in
     place of the lag, and a slow sensor of the stem in place of all viscous friction.
 
-    Raises
-    ------
-    RefusalError
-        If the stem does not follow the force.
+    Raises RefusalError if the stem does not follow the force.
     """
     return _Search(record, prior, curves, static_friction).all_probable()
 
@@ -631,21 +599,8 @@ def posteriors_at(
 ) -> list[PosteriorFit]:
     """Return the posterior of a record about a model that is known to be right, without a search.
 
-    Parameters
-    ----------
-    record : FittedRecord
-        A simulated record.
-    prior : Prior
-        Prior knowledge of an identification.
-    truth : mapping of str to float
-        Coordinates of the simulated valve; the others are absent.
-    with_competitors : bool
-        Whether to add the fits that trade viscous friction for lag, as `search` does.
-
-    Raises
-    ------
-    RefusalError
-        If the stem does not follow the force.
+    `truth` are coordinates of the valve that was simulated; the others are absent. The competitors
+    trade viscous friction for lag, as `search` does. Raises RefusalError as there.
     """
     found = _Search(record, prior)
     at = {**found.base, **truth}

@@ -14,24 +14,27 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
+from valve_friction_ros.identification.engine.coordinates import IMPERFECTIONS, TIMING, Profile
 from valve_friction_ros.identification.engine.friction_curve import FrictionCurve
-from valve_friction_ros.identification.engine.imperfections import Profile
 from valve_friction_ros.identification.engine.intervals import (
     NOISE_LIKE,
-    Doubt,
+    NOT_QUITE,
+    ROUNDING,
     Estimated,
-    doubt_of,
 )
+from valve_friction_ros.identification.engine.lags import LARGEST_LAG
 from valve_friction_ros.identification.engine.posterior_fit import PosteriorFit
-from valve_friction_ros.identification.engine.sentences import late_sensor, main_doubt, slips
-from valve_friction_ros.identification.settings import IdentificationSettings
-from valve_friction_ros.identification.trust.misfit import Misfit
+from valve_friction_ros.identification.settings import SLIDING, UNITS, IdentificationSettings
+from valve_friction_ros.identification.trust.uncertainty import NORMAL_QUANTILE
 from valve_friction_ros.identification.trust.verdict import (
+    COVERAGE,
     FALL_SPEED,
     NO_SLIP,
     PRELOAD_SCALE,
     WEAK_SHARE,
+    Misfit,
     Parameter,
     Verdict,
     fixed,
@@ -40,25 +43,214 @@ from valve_friction_ros.identification.trust.verdict import (
     share_of,
     with_verdict,
 )
-from valve_friction_ros.identification.units import SLIDING, UNITS
-from valve_friction_ros.wording import two_digits
+from valve_friction_ros.model.recording import StampedRecord, StampedSignal
+from valve_friction_ros.signals import quantisation_step, stamped_noise, without_repeats
+from valve_friction_ros.wording import percentage, two_digits
+
+_SURE = 3.0
+_LEAST_SLIP = 0.1
+"""Slip force over F_s above which there is a slip jump.
+
+The slip force cannot be negative, so that noise alone makes it positive."""
+
+_OTHERS = {
+    "start_position": "initial stem position",
+    ROUNDING: "force within one step of the converter",
+}
+"""Words for the sources of uncertainty that are not imperfections."""
+
+_SHARE = 0.2
+"""Share of the variance above which a source is named."""
+
+
+def _size(name: str, value: float) -> str:
+    if name in TIMING:
+        return f"{two_digits(1e3 * abs(value))} ms"
+    if name == "presliding":
+        return f"{1e6 * value:.2g} µm"
+    if name == "limit_velocity":
+        return f"{1e3 * value:.2g} mm/s"
+    if name == "slip_force":
+        return f"F_s above F_c by {value:.3g} N"
+    if name in ("along_travel", "in_record"):
+        way = "rises" if value > 0 else "falls"
+        return f"friction {way} by {percentage(2 * abs(value))}"
+    return percentage(value)
+
+
+def slips(fit: PosteriorFit) -> bool:
+    """Return whether F_s lies above F_c by more than chance and its bound at F_c explain."""
+    static = fit.at["coulomb_friction"] + fit.at["slip_force"]
+    return fit.at["slip_force"] > max(_SURE * fit.deviation("slip_force"), _LEAST_SLIP * static)
+
+
+def found_imperfections(fit: PosteriorFit, lag: Estimated) -> tuple[str, ...]:
+    """Return a sentence for each imperfection that is certain, the most certain first.
+
+    A single source of a lag is certain only if their sum is, `lag`, s, over all probable fits.
+    """
+    found = []
+    is_late = abs(lag.value) > _SURE * lag.half_width / NORMAL_QUANTILE
+    for name in fit.names:
+        if (name == "slip_force" and not slips(fit)) or (name in TIMING and not is_late):
+            continue
+        value, deviation, one = fit.at[name], fit.deviation(name), IMPERFECTIONS.get(name)
+        if one and abs(value) > max(one.least, _SURE * deviation):
+            found.append((deviation / abs(value), f"{one.words}: {_size(name, value)}"))
+    return tuple(sentence for _, sentence in sorted(found))
+
+
+def main_doubt(one: Estimated, width: str) -> str:
+    """Name what makes an interval wide: the imperfections that the record leaves open.
+
+    `width` is the text of `interval_share`.
+    """
+    total = sum(source**2 for source in one.sources.values()) + one.record**2
+    named = [
+        _OTHERS[name] if name in _OTHERS else IMPERFECTIONS[name].words
+        for name, source in sorted(one.sources.items(), key=lambda item: -item[1])
+        if source**2 > _SHARE * total
+    ]
+    share = f"its interval is {width}"
+    if not named:
+        return f"{share}, due to noise and to motion that the model does not explain"
+    return f"{share}; not determined by the record: {', '.join(named[:3])}"
+
+
+def late_sensor(name: str, value: float) -> str:
+    """Say what a number would be if the sensor of the stem were slow."""
+    unit = UNITS.get(name, "N")
+    return (
+        f"it would be {value:.3g} {unit} with a slow stem sensor, whose lag the record cannot "
+        "separate from viscous friction; set timing_uncertainty"
+    )
+
+
+_JITTER = 0.01
+"""Scatter of the pauses, over the period, above which stamps are irregular."""
+
+_IRREGULAR = 0.25
+"""The same, above which a pause no longer shows whether a sample is missing."""
+
+_DROPS = 0.005
+"""Share of missing samples above which they are reported."""
+
+_LONG = 1.5
+"""Pause, over the period, from which a sample may be missing."""
+
+_GAP = 10.0
+_RATES = 1.5
+_HELD = 1.5
+"""Mean number of equal samples in a row, while the signal moves, above which it is held."""
+
+_COARSE = 1.0
+"""Step of a converter, over the deviation of the noise, above which the step is coarse."""
+
+_LASTING = 0.016
+"""Time, s, between samples whose noise is compared with that of neighbours."""
+
+_COLOURED = 2.0
+"""Noise, over that of neighbours, above which it is reported as lasting.
+
+It is 1 for white noise, up to 1.5 in a benchmark's records of jerking stems, 2.6 and more where
+noise has a memory of 5 ms."""
+
+_FEWEST = 500
+_SLOW = 0.02
+"""Period, s, above which a slow stem may not be followed through its corners."""
+
+
+def _missing_share(pauses: NDArray[np.float64]) -> float:
+    """Share of the samples that are missing, from `pauses` over the period, outside gaps.
+
+    A pause is long because of a lost sample or jitter. Jitter takes from the neighbouring pauses
+    what it adds to this one, so they are counted with it.
+    """
+    near = pauses[pauses <= _GAP]
+    long = np.convolve(near >= _LONG, np.ones(3), "same") > 0
+    ordinary = near[~long] if (~long).any() else near[near < _LONG]
+    missing = float(np.sum(near[long])) / float(np.mean(ordinary)) - np.count_nonzero(long)
+    return max(missing, 0.0) / (near.size + 1 + max(missing, 0.0))
+
+
+def _stamp_remarks(name: str, signal: StampedSignal) -> list[str]:
+    pauses = np.diff(signal.time) / signal.period
+    scatter = float(np.std(pauses[pauses < _LONG]))
+    lost = _missing_share(pauses)
+    remarks = []
+    if scatter > _JITTER:
+        remarks.append(f"the stamps of {name} jitter by {percentage(scatter)} of their interval")
+    if lost > _DROPS and scatter < _IRREGULAR:
+        remarks.append(f"{percentage(lost)} of the samples of {name} are missing")
+    gaps = pauses[pauses > _GAP]
+    if gaps.size:
+        seconds = float(np.sum(gaps)) * signal.period
+        count = "a gap" if gaps.size == 1 else f"{gaps.size} gaps"
+        remarks.append(f"{count} in {name}, {seconds:.2g} s in total, left out")
+    return remarks
+
+
+def _value_remarks(name: str, signal: StampedSignal, size: float, unit: str) -> list[str]:
+    """Return remarks on the values of a signal, in a unit with its size in SI units."""
+    changes = np.flatnonzero(np.diff(signal.value))
+    remarks: list[str] = []
+    if changes.size < 2:
+        return remarks
+    runs = np.diff(changes)
+    held = float(np.median(runs))
+    step = quantisation_step(signal.value)
+    noise = stamped_noise(signal)
+    if held > _HELD:
+        remarks.append(
+            f"values of {name} hold for {1e3 * held * signal.period:.2g} ms: a slow source, or "
+            "the dead band of a historian"
+        )
+    if step > _COARSE * noise:
+        remarks.append(
+            f"the resolution of {name} is coarse: its steps of {step / size:.3g} {unit} exceed the "
+            "noise"
+        )
+    return remarks
+
+
+def _noise_remarks(name: str, signal: StampedSignal) -> list[str]:
+    remarks, noise = [], stamped_noise(signal)
+    apart = int(_LASTING / signal.period)
+    if apart > 1 and signal.value.size > _FEWEST * apart:
+        lasting = stamped_noise(StampedSignal(signal.time[::apart], signal.value[::apart]))
+        if lasting > _COLOURED * noise:
+            remarks.append(
+                f"the noise of {name} is not white: {lasting / noise:.2g} times as large over "
+                f"{1e3 * _LASTING:g} ms as between successive samples"
+            )
+    return remarks
+
+
+def sampling_remarks(record: StampedRecord) -> tuple[str, ...]:
+    """Return a sentence for each way in which the samples differ from those of a good sensor."""
+    remarks, drive = [], record.driven_by
+    for name, signal, size, unit in (
+        (f"the {drive.words}", record.drive, drive.size, drive.unit),
+        ("the stem", record.position, 1e-6, "µm"),
+    ):
+        remarks += _stamp_remarks(name, signal) + _value_remarks(name, signal, size, unit)
+        remarks += _noise_remarks(name, without_repeats(signal))
+    periods = record.drive.period, record.position.period
+    if max(periods) > _RATES * min(periods):
+        remarks.append(
+            f"the signals have different rates: {drive.words} {1 / periods[0]:.3g} Hz, stem "
+            f"{1 / periods[1]:.3g} Hz"
+        )
+    if max(periods) > _SLOW:
+        remarks.append(f"the sampling is slow: {1 / max(periods):.3g} Hz")
+    return tuple(remarks)
+
 
 USABLE = 0.1
 """Half width over value up to which a sliding friction is of use to maintenance.
 
 Chosen: well below the 25 % of growth that raises the first alarm."""
 
-_DOUBTS = {
-    Doubt.MISFIT: (
-        "no friction model here reproduces the motion exactly ({um} µm of the deviation is more "
-        "than noise): the sliding friction is reliable, its components are not"
-    ),
-    Doubt.LAG: (
-        "the best fit puts the signals {ms:.0f} ms apart, which is not plausible: something else "
-        "in the motion looks like a lag"
-    ),
-    Doubt.UNTRIED: "the search ended before it tried other lags: use a shorter record",
-}
 _FAILED = 100.0
 """Inflation of the residual beyond which no number that only the simulation gives is reported: ten
 times the noise."""
@@ -89,8 +281,6 @@ _NOISE_SHARE, _LEAST = 0.2, 2e-4
 
 Chosen: 70 of 71 simulated records of Karnopp valves stay within it."""
 
-_TWO = 2.0
-
 
 def fit_misfit(
     fit: PosteriorFit, numbers: Mapping[str, Estimated], profile: Profile = Profile.PLANT
@@ -118,7 +308,7 @@ def fit_misfit(
         return Misfit(fitted, rms, systematic, tolerated)
     systematic = math.sqrt(max(rms**2 - noise, 0.0))
     sliding = numbers["sliding_friction"]
-    certain = sliding.half_width <= _TWO * USABLE * abs(sliding.value)
+    certain = sliding.half_width <= 2.0 * USABLE * abs(sliding.value)
     describes = certain or fit.inflation < NOISE_LIKE
     return Misfit(fitted, rms, systematic, systematic if describes else 0.5 * systematic)
 
@@ -144,7 +334,7 @@ def fit_verdicts(
             f"{two_digits(misfit.systematic * 1e6)} µm of the misfit is more than noise"
         )
     top = _top_speed(fit)
-    slow, split = _slow_doubt(top), _split_doubt(fits, misfit, profile)
+    slow, split = _slow_doubt(top), split_doubt(fits, misfit, profile)
     unseen = _unseen(fit, numbers, settings, split)
     verdicts = {}
     for name, one in numbers.items():
@@ -154,19 +344,29 @@ def fit_verdicts(
         reason = doubt or (slow if name in _BY_SPEED else "")
         if split and not (name in _OF_SLIP and fit.inflation <= NOISE_LIKE):
             reason = "" if name in _OF_THE_BALANCE else reason or split
-        scale = PRELOAD_SCALE * force_range if name == "spring_preload" else 0.0
-        share = share_of(one.value, width, scale)
-        if not reason and WEAK_SHARE < share < math.inf:
-            reason = main_doubt(one.budget, interval_share(one.value, share, scale))
-        if not reason and one.has_rival:
-            reason = late_sensor(name, one.rival)
         if name in settings.fixed and name != "limit_velocity":
             verdicts[name] = fixed(name, settings.fixed[name])
         elif name in unseen:
             verdicts[name] = not_identifiable(name, unseen[name])
         else:
-            verdicts[name] = with_verdict(name, one.value, width / _TWO, width, reason, scale)
+            verdicts[name] = judged(name, one, width, reason, force_range)
     return _no_surer_than_its_spring(verdicts)
+
+
+def judged(
+    name: str, one: Estimated, width: float, reason: str = "", force_range: float = 0.0
+) -> Parameter:
+    """Give a number its verdict by this half width; without a reason, its main doubt is one.
+
+    A preload that is small against the `force_range` of the record, N, is judged by that range.
+    """
+    scale = PRELOAD_SCALE * force_range if name == "spring_preload" else 0.0
+    share = share_of(one.value, width, scale)
+    if not reason and WEAK_SHARE < share < math.inf:
+        reason = main_doubt(one, interval_share(one.value, share, scale))
+    if not reason and one.has_rival:
+        reason = late_sensor(name, one.rival)
+    return with_verdict(name, one.value, width / COVERAGE, width, reason, scale)
 
 
 def _no_surer_than_its_spring(verdicts: dict[str, Parameter]) -> dict[str, Parameter]:
@@ -184,12 +384,27 @@ def _no_surer_than_its_spring(verdicts: dict[str, Parameter]) -> dict[str, Param
     return {**verdicts, "spring_preload": weak}
 
 
-def _split_doubt(fits: Sequence[PosteriorFit], misfit: Misfit, profile: Profile) -> str:
-    """Return why only numbers that the force balance determines too can be identified, if so."""
-    doubt = doubt_of(fits, profile)
-    if doubt is None:
+def split_doubt(fits: Sequence[PosteriorFit], misfit: Misfit, profile: Profile) -> str:
+    """Return why the simulated stem determines no more than the force balance does, if so.
+
+    The residual of a plant exceeds noise, the lag is impossible, or the search could not trade
+    viscous friction for lag while both are unknown.
+    """
+    best = fits[0]
+    if best.inflation > NOT_QUITE and profile.has_imperfections:
+        return (
+            f"no friction model here reproduces the motion exactly ("
+            f"{two_digits(1e6 * misfit.systematic)} µm of the deviation is more than noise): the "
+            "sliding friction is reliable, its components are not"
+        )
+    if abs(best.lag) >= LARGEST_LAG:
+        return (
+            f"the best fit puts the signals {1e3 * abs(best.lag):.0f} ms apart, which is not "
+            "plausible: something else in the motion looks like a lag"
+        )
+    if len(fits) > 1 or "viscous_friction" not in best.names or not best.lags.any():
         return ""
-    return _DOUBTS[doubt].format(um=two_digits(1e6 * misfit.systematic), ms=1e3 * abs(fits[0].lag))
+    return "the search ended before it tried other lags: use a shorter record"
 
 
 def _unseen(
@@ -224,7 +439,7 @@ def curve_misfit(curve: FrictionCurve, sliding: Estimated) -> Misfit:
     As for a simulation, the model is doubted only where the sliding friction stays uncertain.
     """
     systematic = curve.misfit * math.sqrt(max(1.0 - 1.0 / curve.inflation, 0.0))
-    describes = sliding.but_rounding <= _TWO * USABLE * abs(sliding.value)
+    describes = sliding.but_rounding <= 2.0 * USABLE * abs(sliding.value)
     tolerated = systematic if describes else 0.5 * systematic
     return Misfit(curve.fit, curve.misfit, systematic, tolerated, "N")
 
@@ -238,8 +453,7 @@ def curve_verdicts(
     """Return every reported number of a force balance with its verdict.
 
     Mass, spring, preload and sliding friction may be identified. The components of the sliding
-    friction are at most weak, as no simulated stem confirms them. A preload that is small against
-    the `force_range` of the record, N, is judged by that range.
+    friction are at most weak, as no simulated stem confirms them.
     """
     verdicts = {}
     for name in (*UNITS, SLIDING):
@@ -251,15 +465,8 @@ def curve_verdicts(
         elif one is None or (one.value < 0 and name != "spring_preload"):
             verdicts[name] = not_identifiable(name, "the record does not determine it")
         else:
-            width = one.half_width
             reason = _UNCONFIRMED if name in _BY_SPEED else ""
-            scale = PRELOAD_SCALE * force_range if name == "spring_preload" else 0.0
-            share = share_of(one.value, width, scale)
-            if not reason and share > WEAK_SHARE:
-                reason = main_doubt(one.budget, interval_share(one.value, share, scale))
-            if not reason and one.has_rival:
-                reason = late_sensor(name, one.rival)
-            verdicts[name] = with_verdict(name, one.value, width / _TWO, width, reason, scale)
+            verdicts[name] = judged(name, one, one.half_width, reason, force_range)
     return _no_surer_than_its_spring(verdicts)
 
 

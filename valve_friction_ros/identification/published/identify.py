@@ -9,30 +9,29 @@
 
 """Identification of the Karnopp parameters from a recording, as published."""
 
+import math
+from collections.abc import Container, Mapping
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from valve_friction_ros.identification.published.estimate import Estimate
 from valve_friction_ros.identification.published.sweep import (
+    Estimate,
     ForceBalanceRegression,
     Sweep,
     force_balance_regression,
+    possible_model,
     sweep_thresholds,
 )
-from valve_friction_ros.identification.refusal import LittleMotionError
-from valve_friction_ros.identification.settings import IdentificationSettings
-from valve_friction_ros.identification.trust.excitation import (
-    require_drive,
-    require_enough_samples,
-    require_motion,
-    require_two_directions,
-    require_unbroken,
-)
+from valve_friction_ros.identification.refusal import LittleMotionError, RefusalError
+from valve_friction_ros.identification.result import Result
+from valve_friction_ros.identification.settings import SLIDING, UNITS, IdentificationSettings
+from valve_friction_ros.identification.trust import excitation
 from valve_friction_ros.identification.trust.plausible_units import require_plausible_units
 from valve_friction_ros.identification.trust.sliding import mean_speed
+from valve_friction_ros.identification.trust.verdict import Parameter, Verdict, fixed
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.signals import MeasuredRecord, measured, runs_of, velocity_noise
@@ -44,7 +43,7 @@ Chosen: double precision rounds forces at 1e-16, and the sweep adds up some 10,0
 
 
 def choose_threshold(sweep: Sweep, window: int) -> int:
-    """Choose the step of the sweep whose estimates are determined best.
+    """Choose the step of the sweep whose estimates are determined best: its index.
 
     The published rule takes the region of smallest σ_s. Taken literally it fails: far up the
     sweep a handful of samples, all of nearly one speed, fits any parameters, and σ_s is smallest
@@ -60,22 +59,7 @@ def choose_threshold(sweep: Sweep, window: int) -> int:
     samples that still obey the sliding force balance. Steps with fewer samples than n_P windows
     are left out, because the derivatives within one window are not independent.
 
-    Parameters
-    ----------
-    sweep : Sweep
-        Estimates for each threshold.
-    window : int
-        Length d of the derivative window, samples.
-
-    Returns
-    -------
-    int
-        Index into the arrays of `sweep`.
-
-    Raises
-    ------
-    RefusalError
-        If no threshold leaves enough samples to determine the free parameters.
+    Raises RefusalError if no threshold leaves enough samples to determine the free parameters.
     """
     usable = np.isfinite(sweep.sigma) & (sweep.samples >= sweep.free * window)
     if not usable.any():
@@ -144,7 +128,7 @@ def _onset(displacement: NDArray[np.float64], spread: float) -> int | None:
 
 
 def find_breakaways(recording: Recording, settings: IdentificationSettings) -> list[Breakaway]:
-    """Find the instants at which the stem leaves a rest.
+    """Find the instants at which the stem leaves a rest, in time order.
 
     A rest is a stretch of at least two derivative windows without a speed that the noise cannot
     explain. The part of the rest before the next motion gives its position and its noise.
@@ -152,18 +136,6 @@ def find_breakaways(recording: Recording, settings: IdentificationSettings) -> l
     noise put the onset at t₁ − (t₂ − t₁)/(4^(1/p) − 1) if it grows as time to the power p:
     p = 2 under a growing force, p = 1 after a slip jump, whichever has the smaller residual.
     Without noise the three instants coincide.
-
-    Parameters
-    ----------
-    recording : Recording
-        Stem position and pressure.
-    settings : IdentificationSettings
-        Window and order of the derivatives.
-
-    Returns
-    -------
-    list of Breakaway
-        In time order; indices into the samples of `recording`.
     """
     window = settings.published_window
     record = measured(recording)
@@ -195,36 +167,6 @@ _MASS_TOLERANCE = 0.25
 Chosen from 54 simulated records (3 packings, 3 excitations, 3 levels of noise, with and without
 x̄): masses within 10 % of the truth changed by 5 % at most; wrong masses, except one, by 45 % or
 more."""
-
-
-class PublishedFit(NamedTuple):
-    """An estimate with the regression that it solves."""
-
-    estimate: Estimate
-    regression: ForceBalanceRegression
-
-    @property
-    def share_of_force(self) -> float:
-        """Share of the moving stem's force that is reproduced, 1 − |residual| / |force − mean|."""
-        regression = self.regression
-        moving = regression.speed > self.estimate.threshold
-        values = np.array([self.estimate.values[name] for name in regression.names])
-        force = regression.force[moving]
-        left = regression.columns[moving] @ values - force
-        whole = float(np.linalg.norm(force - force.mean()))
-        return 1 - float(np.linalg.norm(left)) / whole if whole > 0 else 0.0
-
-    @property
-    def sliding_speed(self) -> float:
-        """Mean speed over the distance, m/s, of the samples above the threshold."""
-        speed = self.regression.speed
-        return mean_speed(speed[speed > self.estimate.threshold])
-
-    @property
-    def sliding_friction(self) -> float:
-        """F_c + F_v·|ẋ| at `sliding_speed`, N: the work of friction per distance."""
-        estimate = self.estimate
-        return estimate.coulomb_friction + estimate.viscous_friction * self.sliding_speed
 
 
 def chosen_step(
@@ -327,24 +269,24 @@ def published_estimate(
     """
     settings, record = settings or IdentificationSettings(), measured(recording)
     require_published(record, valve, settings)
-    return published_fit(record, valve, settings).estimate
+    return published_fit(record, valve, settings)[0]
 
 
 def require_published(
     record: MeasuredRecord, valve: Valve, settings: IdentificationSettings
 ) -> None:
     """Refuse a record with a gap, or whose stem does not move both ways."""
-    require_unbroken(record)
-    require_enough_samples(record, settings.published_window)
-    require_motion(record)
-    require_drive(record, valve)
+    excitation.require_unbroken(record)
+    excitation.require_enough_samples(record, settings.published_window)
+    excitation.require_motion(record)
+    excitation.require_drive(record, valve)
     require_plausible_units(record, valve, settings)
-    require_two_directions(record, settings.published_window)
+    excitation.require_two_directions(record, settings.published_window)
 
 
 def published_fit(
     record: MeasuredRecord, valve: Valve, settings: IdentificationSettings
-) -> PublishedFit:
+) -> tuple[Estimate, ForceBalanceRegression]:
     """Identify a checked record as `published_estimate` does, and return the regression too."""
     warnings: list[str] = []
     derivatives = record.derivatives(settings.published_window, settings.order)
@@ -389,4 +331,124 @@ def published_fit(
         settings=settings,
         sweep=sweep,
     )
-    return PublishedFit(estimate, regression)
+    return estimate, regression
+
+
+def published_beside(
+    record: MeasuredRecord, valve: Valve, settings: IdentificationSettings
+) -> tuple[Estimate | None, list[str]]:
+    """Run the published method alongside another method, which has checked the record.
+
+    A refusal becomes a warning.
+    """
+    try:
+        excitation.require_unbroken(record)
+        return published_fit(record, valve, settings)[0], []
+    except RefusalError as refusal:
+        return None, [f"the published method refused the record: {refusal}"]
+
+
+def sweep_evidence(estimate: Estimate) -> dict[str, float | int]:
+    """Return the figures of the chosen threshold, SI units."""
+    return {
+        "threshold": estimate.threshold,
+        "samples": estimate.samples,
+        "sigma": estimate.sigma,
+        "r_squared": estimate.r_squared,
+        "published_window": estimate.settings.published_window,
+    }
+
+
+def sweep_finding(estimate: Estimate) -> str:
+    """Return the figures of the chosen threshold as a sentence."""
+    return (
+        f"published: threshold δv {estimate.threshold:.4g} m/s, {estimate.samples} samples above "
+        f"it, σ_s {estimate.sigma:.4g} N, R² {estimate.r_squared:.6f}, window "
+        f"{estimate.settings.published_window} samples"
+    )
+
+
+def with_published(
+    parameters: Mapping[str, Parameter], estimate: Estimate | None
+) -> dict[str, Parameter]:
+    """Add the published value to each parameter of the Karnopp model."""
+    if estimate is None:
+        return dict(parameters)
+    return {
+        name: replace(each, published=estimate.values[name]) if name in UNITS else each
+        for name, each in parameters.items()
+    }
+
+
+METHOD = "published"
+"""Name of this method."""
+
+_NO_INTERVAL = "the published method gives no interval"
+
+
+def identify_published(
+    recording: Recording, valve: Valve, settings: IdentificationSettings | None = None
+) -> Result:
+    """Identify a record as published (`published_estimate`); every verdict is weak or fixed.
+
+    The settings are the paper's by default, with the preload as a separate regressor.
+
+    Returns
+    -------
+    Result
+        Parameters without intervals.
+
+    Raises
+    ------
+    RefusalError
+        If the record does not determine the friction; the message names cause and remedy.
+    """
+    settings = settings or IdentificationSettings()
+    record = measured(recording)
+    require_published(record, valve, settings)
+    estimate, regression = published_fit(record, valve, settings)
+    speed = mean_speed(regression.speed[regression.speed > estimate.threshold])
+    parameters = {name: _stated(name, estimate, settings.fixed) for name in estimate.values}
+    parameters[SLIDING] = _without_interval(
+        SLIDING, estimate.coulomb_friction + estimate.viscous_friction * speed
+    )
+    return Result(
+        method=METHOD,
+        recording=recording,
+        valve=valve,
+        settings=settings,
+        parameters=with_published(parameters, estimate),
+        fit=_share_of_force(estimate, regression),
+        rms=math.nan,
+        misfit=None,
+        derivative_window=settings.published_window,
+        warnings=estimate.warnings,
+        evidence=sweep_evidence(estimate),
+        findings=(sweep_finding(estimate),),
+        model=possible_model(estimate),
+        exhibit=estimate,
+        sliding_speed=speed,
+    )
+
+
+def _share_of_force(estimate: Estimate, regression: ForceBalanceRegression) -> float:
+    """Share of the moving stem's force that is reproduced, 1 − |residual| / |force − mean|."""
+    moving = regression.speed > estimate.threshold
+    values = np.array([estimate.values[name] for name in regression.names])
+    force = regression.force[moving]
+    left = regression.columns[moving] @ values - force
+    whole = float(np.linalg.norm(force - force.mean()))
+    return 1 - float(np.linalg.norm(left)) / whole if whole > 0 else 0.0
+
+
+def _stated(name: str, estimate: Estimate, given: Container[str]) -> Parameter:
+    value = estimate.values[name]
+    if name in given:
+        return fixed(name, value)
+    if name in estimate.fixed:
+        return fixed(name, value, "assumed: the record does not determine it")
+    return _without_interval(name, value)
+
+
+def _without_interval(name: str, value: float) -> Parameter:
+    return Parameter(name, value, math.nan, math.nan, Verdict.WEAK, _NO_INTERVAL)

@@ -11,34 +11,25 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from valve_friction_ros.identification.settings import REGRESSED, IdentificationSettings
+from valve_friction_ros.identification.drawing import Curve, Drawing, Panel
+from valve_friction_ros.identification.settings import REGRESSED, UNITS, IdentificationSettings
+from valve_friction_ros.identification.trust.verdict import Parameter
 from valve_friction_ros.model.compiled import compiled_reductions
+from valve_friction_ros.model.valve import KarnoppParameters, Valve
 from valve_friction_ros.signals import Derivatives
 
 
 @dataclass(frozen=True, eq=False)
 class ForceBalanceRegression:
-    """Regressors φ(t) of (5), the force that they explain, and the speed that selects samples.
+    """Regressors φ(t) of (5), (n, p), the force that they explain, N, and the speed, m/s.
 
-    Attributes
-    ----------
-    names : tuple of str
-        The free parameters, one per column.
-    columns : ndarray of float, shape (n, p)
-        Regressor of each free parameter.
-    force : ndarray of float, shape (n,)
-        Actuator force minus the contribution of the fixed parameters, N.
-    speed : ndarray of float, shape (n,)
-        Absolute velocity, m/s.
-    fixed : mapping of str to float
-        Parameters outside the regression.
-    position_bias : float or None
-        x̄ of (10) where the preload follows from it.
+    The force is that of the actuator minus the contribution of the parameters that are `fixed`.
+    Where the `position_bias` x̄ of (10) is known, the preload follows from it.
     """
 
     names: tuple[str, ...]
@@ -120,32 +111,15 @@ def factors_above(
     speed: NDArray[np.float64],
     thresholds: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
-    """Factorise ``[Φ_s F_s]``, the samples faster than each threshold.
+    """Factorise ``[Φ_s F_s]``, the samples faster than each of the increasing thresholds.
 
     From the highest threshold down each step only adds the rows between two thresholds, which
     Householder reflections merge into the current triangular factor: ``[R; rows] = Q R'``.
     Every row is visited once, and, unlike in sums of products, the condition of the columns is
     not squared. Columns may be of any size, since reflections do not mix them.
 
-    Parameters
-    ----------
-    regressors : ndarray of float, shape (n, p − 1)
-        Regressors Φ.
-    force : ndarray of float, shape (n,)
-        Force F, the last column.
-    speed : ndarray of float, shape (n,)
-        Speed that selects the rows.
-    thresholds : ndarray of float, shape (S,)
-        Thresholds, increasing.
-
-    Returns
-    -------
-    factors : ndarray of float, shape (S, p, p)
-        Upper triangular R with RᵀR = ΦᵀΦ of the selected rows, signs of its rows free.
-    sums : ndarray of float, shape (S, p)
-        Sums of the selected rows.
-    counts : ndarray of int, shape (S,)
-        Number of selected rows.
+    Returns the upper triangular R with RᵀR = ΦᵀΦ of the selected rows, (S, p, p), the signs of its
+    rows free; the sums of these rows, (S, p); and their number, (S,).
     """
     free, steps = regressors.shape[1], thresholds.size
     columns = free + 1
@@ -288,22 +262,8 @@ class Sweep:
 
 
 def sweep_thresholds(regression: ForceBalanceRegression, thresholds: NDArray[np.float64]) -> Sweep:
-    """Solve (7) on the samples above each threshold, in one pass over the samples.
+    """Solve (7) on the samples above each of the increasing thresholds, m/s, in one pass over them.
 
-    Parameters
-    ----------
-    regression : ForceBalanceRegression
-        Regressors and force.
-    thresholds : ndarray of float, shape (S,)
-        Speeds δv(s), m/s, increasing.
-
-    Returns
-    -------
-    Sweep
-        One estimate for each threshold.
-
-    Notes
-    -----
     The triangular factor of the regressors with the force beside them, ``[Φ_s F_s] = Q R``, is
     carried from the highest threshold down (`factors_above`). Its leading block gives the
     estimates, its last diagonal entry the residual norm.
@@ -341,3 +301,143 @@ def sweep_thresholds(regression: ForceBalanceRegression, thresholds: NDArray[np.
         log_information,
         free,
     )
+
+
+SETTLED_SHARE = 0.1
+"""Largest difference of σ_s in the chosen region, as a share of σ_s at the threshold. Chosen."""
+
+_THRESHOLD = "threshold δv [m/s]"
+
+
+def _panels(sweep: Sweep, threshold: float, friction: Parameter) -> tuple[Panel, ...]:
+    """Return F_c, σ_s and, for reports, R²_s over the threshold δv, and F_c of the result."""
+    thresholds, coulomb_friction = sweep.thresholds, sweep.estimates["coulomb_friction"]
+    chosen = int(np.argmin(np.abs(thresholds - threshold)))
+    sigma = np.maximum(sweep.sigma, 1e-9 * np.nanmax(sweep.sigma))
+    return (
+        Panel(
+            "coulomb",
+            _THRESHOLD,
+            "Coulomb friction $F_c$ [N]",
+            (
+                Curve(thresholds, coulomb_friction),
+                Curve([threshold], [coulomb_friction[chosen]], "o"),
+            ),
+            "δv sweep (● published choice, dashed: result, with 95 % band)",
+            level=friction,
+        ),
+        Panel(
+            "sigma",
+            _THRESHOLD,
+            "$\\sigma_s$ [N]",
+            (Curve(thresholds, sigma),),
+            chosen=threshold,
+            is_logarithmic=True,
+        ),
+        Panel(
+            "r_squared",
+            _THRESHOLD,
+            "$R^2_s$ [-]",
+            (Curve(thresholds, sweep.r_squared),),
+            chosen=threshold,
+            is_detail=True,
+        ),
+    )
+
+
+def chosen_region(sweep: Sweep, threshold: float) -> tuple[float, float]:
+    """Return the lowest and highest threshold, m/s, of the region around the chosen threshold."""
+    choice = int(np.argmin(np.abs(sweep.thresholds - threshold)))
+    level = sweep.sigma[choice]
+    settled = np.abs(sweep.sigma - level) <= SETTLED_SHARE * level
+    others = np.flatnonzero(~settled)
+    below, above = others[others < choice], others[others > choice]
+    first = int(below[-1]) + 1 if below.size else 0
+    last = int(above[0]) - 1 if above.size else sweep.thresholds.size - 1
+    return float(sweep.thresholds[min(first, choice)]), float(sweep.thresholds[max(last, choice)])
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """The parameters that the published method finds, with the figures of their sweep.
+
+    Attributes
+    ----------
+    mass, viscous_friction, coulomb_friction : float
+        See `static_friction`.
+    static_friction, spring_constant, spring_preload : float
+        Parameters in SI units, as regressed: an impossible value (a negative mass, say) is shown
+        as it is, with a warning.
+    threshold : float
+        Chosen threshold δv, m/s.
+    samples : int
+        Samples faster than the threshold.
+    sigma : float
+        Standard deviation σ_s of the force residual (17), N.
+    r_squared : float
+        R²_s of (18).
+    fixed : tuple of str
+        Parameters that were given or assumed, not identified.
+    warnings : tuple of str
+        Limitations of the numbers, one sentence each.
+    settings : IdentificationSettings
+        Settings in force; an assumed mass is among the fixed parameters.
+    sweep : Sweep
+        The whole sweep.
+    """
+
+    mass: float
+    viscous_friction: float
+    coulomb_friction: float
+    static_friction: float
+    spring_constant: float
+    spring_preload: float
+    threshold: float
+    samples: int
+    sigma: float
+    r_squared: float
+    fixed: tuple[str, ...]
+    warnings: tuple[str, ...]
+    settings: IdentificationSettings = field(repr=False)
+    sweep: Sweep = field(repr=False)
+
+    @property
+    def values(self) -> dict[str, float]:
+        """The parameters by name, in the order of `UNITS`."""
+        return {name: getattr(self, name) for name in UNITS}
+
+    def drawing(self, parameters: Mapping[str, Parameter], valve: Valve) -> Drawing:  # noqa: ARG002
+        """Return the sweep as figures and reports show it."""
+        sweep, settings = self.sweep, self.settings
+        low, high = chosen_region(sweep, self.threshold)
+        return Drawing(
+            _panels(sweep, self.threshold, parameters["coulomb_friction"]),
+            "Sweep of the velocity threshold δv",
+            f"The friction force balance, fitted to the samples faster than each threshold δv. "
+            f"Chosen: {self.threshold * 1e3:.3g} mm/s, with {self.samples} samples above it, σ_s "
+            f"{self.sigma:.4g} N and R² {self.r_squared:.5f}. Shaded: the region around it, "
+            f"{low * 1e3:.3g} to {high * 1e3:.3g} mm/s, where σ_s stays within "
+            f"{100 * SETTLED_SHARE:.0f} % of that.",
+            "Coulomb friction, standard deviation and correlation over the velocity threshold, "
+            "with the chosen threshold and the region around it marked.",
+            (low, high),
+            settings={
+                "of the published method": f"window {settings.published_window} samples, "
+                f"polynomial order {settings.order}, {settings.steps} thresholds"
+            },
+        )
+
+    def parameters(self) -> KarnoppParameters:
+        """Return the parameters as a model to simulate.
+
+        Raises ValueError if an identified value is impossible; the message names it.
+        """
+        return KarnoppParameters(**self.values)
+
+
+def possible_model(estimate: Estimate) -> KarnoppParameters | None:
+    """Return the regressed values as a model, None where one of them is impossible."""
+    try:
+        return estimate.parameters()
+    except ValueError:
+        return None

@@ -16,10 +16,11 @@ import numpy as np
 
 from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.identification.result import Result, StemComparison
-from valve_friction_ros.identification.settings import IdentificationSettings
-from valve_friction_ros.identification.signature.strokes import BreakawayPoint, SignatureStroke
+from valve_friction_ros.identification.settings import SLIDING, UNITS, IdentificationSettings
 from valve_friction_ros.identification.signature.valve_signature import (
     TRIANGLE_NEEDED,
+    BreakawayPoint,
+    SignatureStroke,
     ValveSignature,
     Ways,
     breakaway_points,
@@ -37,26 +38,20 @@ from valve_friction_ros.identification.steps.validation import (
     identified_model,
     validate,
 )
-from valve_friction_ros.identification.trust.excitation import (
-    require_enough_samples,
-    require_motion,
-    require_related_signals,
-    require_travel,
-    require_unbroken,
-)
-from valve_friction_ros.identification.trust.misfit import stem_distance
+from valve_friction_ros.identification.trust import excitation
 from valve_friction_ros.identification.trust.plausible_units import require_plausible_units
 from valve_friction_ros.identification.trust.sliding import FINEST_SLIDING
 from valve_friction_ros.identification.trust.uncertainty import Jackknife, half_width, jackknife
 from valve_friction_ros.identification.trust.verdict import (
     FALL_SPEED,
+    LEAST_FIT,
     PRELOAD_SCALE,
     Parameter,
     fixed,
     not_identifiable,
+    stem_distance,
     with_verdict,
 )
-from valve_friction_ros.identification.units import SLIDING, UNITS
 from valve_friction_ros.model.drive import Drive
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
@@ -75,9 +70,6 @@ _LEAST_SLIP = 0.03
 
 Chosen: F_s itself may be off by 1 % (`_BREAKAWAY_BIAS`), so a third of that limit is no
 evidence."""
-
-_LEAST_FIT = 0.9
-"""Least share of the motion that the model must reproduce. The limit of `Misfit.is_gross`."""
 
 _HIDDEN = "the stem jumps as it breaks away, too fast or by too little to measure in this record"
 
@@ -173,12 +165,12 @@ def _measured(
 ) -> MeasuredRecord:
     """Return the signals; raises RefusalError where they cannot be a valve signature."""
     record = measured(recording)
-    require_unbroken(record)
+    excitation.require_unbroken(record)
     require_plausible_units(record, valve, settings)
-    require_enough_samples(record, settings.published_window)
-    require_motion(record)
-    require_travel(record, valve)
-    require_related_signals(record)
+    excitation.require_enough_samples(record, settings.published_window)
+    excitation.require_motion(record)
+    excitation.require_travel(record, valve)
+    excitation.require_related_signals(record)
     return record
 
 
@@ -193,7 +185,7 @@ def _validated(
             f"the force balances give an impossible model: {error}; check both signals"
         ) from None
     validation = validate(record, valve, identified.parameters)
-    if validation.fit < _LEAST_FIT:
+    if validation.fit < LEAST_FIT:
         raise RefusalError(
             f"the model of the force balances does not reproduce the record (fit "
             f"{100 * validation.fit:.0f} %): check fixed parameters, both signals and their clocks"
@@ -266,16 +258,9 @@ def _figures(ways: Ways, settings: IdentificationSettings) -> dict[str, float]:
         else:
             bias = mean_position_bias(ways, spring_constant)
     pulls = [
-        float(
-            np.mean(
-                [
-                    stroke.direction * (point.force - spring_constant * (point.position + bias))
-                    for stroke in way
-                    if (point := stroke.breakaway) is not None
-                ]
-            )
-        )
-        for way in ways
+        direction
+        * float(np.mean([one.force - spring_constant * (one.position + bias) for one in points]))
+        for direction, points in zip((1, -1), map(breakaway_points, ways), strict=True)
     ]
     static_friction = given.get("static_friction", float(np.mean(pulls)))
     coulomb_friction = given.get("coulomb_friction", static_friction)

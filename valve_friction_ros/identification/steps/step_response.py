@@ -144,14 +144,10 @@ _NO_CORNERS = np.empty(0, dtype=np.intp)
 
 
 class Bracket(NamedTuple):
-    """Lower and upper bound of a quantity, in the unit of the input.
+    """Bounds of a quantity, in the unit of the input.
 
-    Attributes
-    ----------
-    ignored : float
-        Largest change of the input that the stem ignored; 0 if it ignored none.
-    answered : float
-        Smallest change that it answered; infinite if it answered none.
+    The largest change of the input that the stem ignored, 0 if it ignored none; and the smallest
+    that it answered, infinite if it answered none.
     """
 
     ignored: float

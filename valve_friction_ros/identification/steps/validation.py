@@ -19,13 +19,8 @@ from numpy.typing import NDArray
 
 from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.identification.result import Result
-from valve_friction_ros.identification.settings import IdentificationSettings
-from valve_friction_ros.identification.trust.excitation import (
-    require_drive,
-    require_motion,
-    require_unbroken,
-)
-from valve_friction_ros.identification.units import UNITS
+from valve_friction_ros.identification.settings import UNITS, IdentificationSettings
+from valve_friction_ros.identification.trust import excitation
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.simulation import StemState, simulate
 from valve_friction_ros.model.valve import KarnoppParameters, Valve
@@ -36,15 +31,7 @@ _NAMES = tuple(field.name for field in fields(KarnoppParameters))
 
 
 class IdentifiedModel(NamedTuple):
-    """A model to simulate, and the substitutes for values that were not identified.
-
-    Attributes
-    ----------
-    parameters : KarnoppParameters
-        The model.
-    notes : tuple of str
-        One sentence for each substitute.
-    """
+    """A model to simulate, with a sentence for each substitute of a value not identified."""
 
     parameters: KarnoppParameters
     notes: tuple[str, ...]
@@ -259,9 +246,9 @@ def validate(
             "record of a valve with a spring"
         )
     record = measured(recording)
-    require_unbroken(record)
-    require_motion(record)
-    require_drive(record, valve)
+    excitation.require_unbroken(record)
+    excitation.require_motion(record)
+    excitation.require_drive(record, valve)
     trajectory = simulate(
         valve,
         parameters,

@@ -15,14 +15,14 @@ areas from 30 cm² to two of 2800 cm² in tandem, travel from 5 mm to the 610 mm
 supply up to 10 bar. The ordinary ranges only choose the unit that is named.
 """
 
-from collections.abc import Iterable, Mapping
-from typing import NamedTuple
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.identification.settings import IdentificationSettings
-from valve_friction_ros.identification.trust.uncertainty import block_covariance, stroke_length
+from valve_friction_ros.identification.trust.uncertainty import half_width, jackknife
 from valve_friction_ros.model.drive import Drive
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
@@ -74,8 +74,9 @@ _MOVING_SHARE, _MOVING_NOISE = 0.05, 4.0
 of a record; and in standard deviations of the velocity noise, which in a record of slow moves would
 pass for viscous friction."""
 
-_MOST_BLOCKS = 200
-"""Most blocks for a scatter. Chosen: noise can feign any number of strokes; memory is finite."""
+_BLOCKS = (8, 60)
+"""Fewest and most blocks of a record that show its scatter. Chosen: 7 degrees of freedom make an
+interval 2.4 standard errors; noise can feign any number of strokes."""
 
 _OUTSIDE = 0.05
 """Distance beyond the travel, as a share of it, up to which a record is judged; `require_travel`
@@ -203,16 +204,24 @@ def _least_time_constant(recording: Recording) -> float:
     columns /= lengths[None, :]
     sizes = np.linalg.norm(velocity), np.linalg.norm(place - place.mean())
     columns *= moving[:, None]
-    solved = np.linalg.lstsq(columns, pressure * moving, rcond=None)[0]
-    stroke = stroke_length(np.cumsum(velocity * moving))
-    covariance = block_covariance(
-        columns, columns @ solved - pressure * moving, max(stroke, velocity.size // _MOST_BLOCKS)
+    if np.linalg.matrix_rank(columns.T @ columns) < columns.shape[1]:
+        return 0.0
+    strokes = np.count_nonzero(np.diff(np.sign(velocity[moving]))) + 1
+    parts = (np.array_split(one, np.clip(strokes, *_BLOCKS)) for one in (columns, pressure))
+    blocks = [(part.T @ part, part.T @ force) for part, force in zip(*parts, strict=True)]
+    found = jackknife([blocks], _solved)
+    low, spring, high = (
+        found.values[name] + sign * half_width(found.standard_errors[name], found.freedom)
+        for name, sign in (("viscous", -1), ("spring", 0), ("spring", 1))
     )
-    viscous, spring = (
-        (solved[index] + sign * covariance.half_width(np.eye(4)[index])) / sizes[index]
-        for index, sign in ((0, -1), (1, 1))
-    )
-    return float(viscous / spring) if viscous > 0 and solved[1] > 0 and spring > 0 else 0.0
+    return float(low / sizes[0] / high * sizes[1]) if low > 0 and spring > 0 and high > 0 else 0.0
+
+
+def _solved(groups: Sequence[Sequence[Any]]) -> dict[str, float]:
+    """Solve the normal equations that the blocks add up to."""
+    information, right = (sum(terms) for terms in zip(*groups[0], strict=True))
+    viscous, spring, *_ = np.linalg.lstsq(information, right, rcond=None)[0].tolist()
+    return {"viscous": viscous, "spring": spring}
 
 
 def _beyond(words: str, value: float, quantity: _Quantity) -> str:

@@ -18,8 +18,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from valve_friction_ros.identification.settings import PARAMETER_UNITS
 from valve_friction_ros.identification.trust.verdict import OF_FORCE, Parameter, Verdict
-from valve_friction_ros.identification.units import PARAMETER_UNITS
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
 
@@ -67,21 +67,10 @@ class Cause(Enum):
 
 
 class Contradiction(NamedTuple):
-    """A stated number that the record contradicts.
+    """A stated number that the record contradicts, the found one, SI units, and the likely cause.
 
-    Attributes
-    ----------
-    name : str
-        Name of the parameter.
-    stated, found : float
-        The number as given and as identified, SI units.
-    cause : Cause
-        Likely cause.
-    factor : float
-        Found over stated; nan for a preload, whose zero is arbitrary.
-    pressure : float
-        Pressure that makes up the difference of a preload, Pa; nan for others, and where a force
-        drives the stem.
+    `factor` is found over stated; nan for a preload, whose zero is arbitrary. `pressure`, Pa, makes
+    up the difference of a preload; nan for others, and where a force drives the stem.
     """
 
     name: str
@@ -129,23 +118,8 @@ def contradictions(
     """Compare stated numbers with identified numbers that have a narrow interval.
 
     Spring constant and preload grow with the area and with the scale of the pressure. A wrong zero
-    of the pressure adds a constant to the preload alone.
-
-    Parameters
-    ----------
-    parameters : mapping of str to Parameter
-        Parameters of the result, with the calibration in their intervals.
-    stated : mapping of str to float
-        Spring constant, preload and mass as far as they are stated, SI units.
-    valve : Valve
-        Geometry as given.
-    span : float
-        Travel, or the range of the position where there are no stops, m.
-
-    Returns
-    -------
-    tuple of Contradiction
-        Empty where all agree, or the record is not precise enough.
+    of the pressure adds a constant to the preload alone. The parameters have the calibration in
+    their intervals; `span` is the travel, or the range of the position where there are no stops, m.
     """
     told = []
     spring, factor = _of_scale(parameters, stated, "spring_constant")
@@ -167,16 +141,12 @@ def contradictions(
                 told.append(_of_preload(preload, expected, factor if is_area else 1.0, valve))
     if spring is not None and factor != 1:
         cause = Cause.AREA_SCALE if is_area else Cause.OTHER_SPRING
-        told.insert(0, _of_factor(spring, stated, factor, cause))
+        told.insert(0, Contradiction(spring.name, stated[spring.name], spring.value, cause, factor))
     if mass is not None and heavier != 1:
-        told.append(_of_factor(mass, stated, heavier, Cause.OTHER_MASS))
+        told.append(
+            Contradiction(mass.name, stated[mass.name], mass.value, Cause.OTHER_MASS, heavier)
+        )
     return tuple(told)
-
-
-def _of_factor(
-    one: Parameter, stated: Mapping[str, float], factor: float, cause: Cause
-) -> Contradiction:
-    return Contradiction(one.name, stated[one.name], one.value, cause, factor)
 
 
 def _of_preload(one: Parameter, stated: float, scale: float, valve: Valve) -> Contradiction:
