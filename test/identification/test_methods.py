@@ -17,7 +17,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from records import assert_held, simulated
+from records import TIGHT, assert_held, simulated
 
 from valve_friction_ros.identification import (
     DEFAULT_METHOD,
@@ -33,7 +33,7 @@ from valve_friction_ros.identification import (
     method_named,
     validate,
 )
-from valve_friction_ros.identification.trust.sliding import (
+from valve_friction_ros.identification.trust.uncertainty import (
     mean_sliding_friction,
     mean_speed,
 )
@@ -52,10 +52,6 @@ from valve_friction_ros.streams import Samples, uniform_recording
 
 PERIOD = 1e-3
 DURATION = 42.0
-TRUTH = {
-    name: getattr(HIGH_FRICTION, name)
-    for name in ("coulomb_friction", "viscous_friction", "spring_constant", "spring_preload")
-}
 
 
 @pytest.fixture(scope="module")
@@ -84,8 +80,8 @@ def by(record, method=DEFAULT_METHOD, **settings):
 
 def true_value(name, result):
     """Return a parameter of the packing; its sliding friction at the speed of the result."""
-    sliding = TRUTH["coulomb_friction"] + TRUTH["viscous_friction"] * result.sliding_speed
-    return {**TRUTH, SLIDING: sliding}[name]
+    sliding = TIGHT["coulomb_friction"] + TIGHT["viscous_friction"] * result.sliding_speed
+    return {**TIGHT, SLIDING: sliding}[name]
 
 
 def without(recording, begin, end, signals=("drive", "position")):
@@ -121,8 +117,8 @@ class TestProfiles:
     def test_a_bench_has_no_imperfections(self, whole):
         found = by(whole, "bench")
         assert found.method == "bench"
-        assert_held(found.parameters, TRUTH)
-        assert found.parameters["coulomb_friction"].half_width < 2e-3 * TRUTH["coulomb_friction"]
+        assert_held(found.parameters, TIGHT)
+        assert found.parameters["coulomb_friction"].half_width < 2e-3 * TIGHT["coulomb_friction"]
         assert not found.warnings
         budget = found.evidence["uncertainty_budget"]
         assert {share["timing"] for share in budget.values()} == {0.0}
@@ -159,7 +155,7 @@ class TestGap:
     )
     def test_the_default_leaves_it_out(self, whole, signals):
         found = identify(without(whole, 14.5, 15.8, signals), BENCH_VALVE)
-        assert_held(found.parameters, TRUTH)
+        assert_held(found.parameters, TIGHT)
         friction = found.parameters["coulomb_friction"]
         assert friction.verdict is Verdict.IDENTIFIED
         assert friction.half_width < 0.01 * friction.value
@@ -181,7 +177,7 @@ class TestTimingUncertainty:
         drive, stem = whole.drive, whole.position
         pair = (drive[late:], stem[:-late]) if late > 0 else (drive[:late], stem[-late:])
         found = identify(Recording(PERIOD, *pair), BENCH_VALVE)
-        for name, true in TRUTH.items():
+        for name, true in TIGHT.items():
             one = found.parameters[name]
             assert abs(one.value - true) <= one.half_width < 0.035 * true, name
         lag = found.evidence[IMPERFECTIONS_FOUND]["lag"]
@@ -218,7 +214,7 @@ class TestTimingUncertainty:
         widths = [one.parameters["coulomb_friction"] for one in results]
         assert repr(widths[0]) == repr(widths[1])
         assert widths[2].half_width > 3 * widths[0].half_width
-        assert abs(widths[2].value - TRUTH["coulomb_friction"]) <= widths[2].half_width
+        assert abs(widths[2].value - TIGHT["coulomb_friction"]) <= widths[2].half_width
 
 
 class TestCalibration:
@@ -312,18 +308,6 @@ def test_of_a_signature_is_half_the_loop_at_the_speed_of_its_strokes(tried, benc
     assert abs(found.value - truth) <= found.half_width < 5e-3 * truth
     loop = 0.5 * result.evidence["dead_zone"] * benches[name].valve.diaphragm_area
     assert found.value == pytest.approx(loop, rel=1e-3)
-
-
-def test_of_the_published_method_is_that_above_its_threshold(tried, benches):
-    result, *_ = tried("low", "square", "published")
-    found, values = result.parameters["sliding_friction"], result.values
-    assert found.value == pytest.approx(
-        values["coulomb_friction"] + values["viscous_friction"] * result.sliding_speed
-    )
-    assert np.isnan(found.half_width)
-    packing = benches["low"].parameters
-    truth = packing.coulomb_friction + packing.viscous_friction * result.sliding_speed
-    assert found.value == pytest.approx(truth, rel=1e-3)
 
 
 CODE = """

@@ -25,6 +25,12 @@ from valve_friction_ros.model import (
     simulate,
 )
 
+TIGHT = {
+    name: getattr(HIGH_FRICTION, name)
+    for name in ("coulomb_friction", "viscous_friction", "spring_constant", "spring_preload")
+}
+"""True numbers of the tight packing."""
+
 
 def simulated(pressure, sample_period, parameters=LOW_FRICTION):
     """Record of the bench valve under `pressure`, without noise."""

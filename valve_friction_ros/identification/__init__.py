@@ -91,7 +91,7 @@ if TYPE_CHECKING:
     from valve_friction_ros.identification.trust.plausible_units import (
         require_valve_units as require_valve_units,
     )
-    from valve_friction_ros.identification.trust.sliding import (
+    from valve_friction_ros.identification.trust.uncertainty import (
         COMPARABLE as COMPARABLE,
         SPEED_EXPONENT as SPEED_EXPONENT,
     )

@@ -25,18 +25,10 @@ from valve_friction_ros.wording import with_width
 
 
 class Curve(NamedTuple):
-    """Points in one style.
+    """Points in one style: a line, ``-`` or ``--``, or a marker: ``o``, ``^``, ``v`` or ``D``.
 
-    Attributes
-    ----------
-    x, y : array_like
-        Coordinates of the points.
-    style : str
-        A line, ``-`` or ``--``, or a marker: ``o``, ``^`` or ``v``.
-    label : str
-        Name in the legend; empty for none.
-    half_width : array_like or None
-        Half the interval of each y: bars at markers, a band about a line.
+    The `label` is its name in the legend, empty for none; `half_width` is half the interval of each
+    y: bars at markers, a band about a line.
     """
 
     x: ArrayLike
@@ -59,24 +51,9 @@ class Curve(NamedTuple):
 class Panel:
     """A separate panel; the panels of a drawing share their x axis.
 
-    Attributes
-    ----------
-    name : str
-        Name of the axes.
-    x_label, y_label : str
-        Labels of the axes, with unit.
-    curves : tuple of Curve
-        In the units of the labels.
-    title : str
-        Text above the panel.
-    chosen : float or None
-        Value on the x axis that the method chose.
-    level : Parameter or None
-        Parameter on the y axis, drawn with its interval and verdict.
-    is_logarithmic : bool
-        Whether the y axis is logarithmic.
-    is_detail : bool
-        Whether only a report shows the panel.
+    The axes have a `name`, and labels with the units of the curves. `chosen` is the value on the x
+    axis that the method chose; `level` is a parameter on the y axis, drawn with its interval and
+    verdict. A panel that `is_detail` is shown by a report only.
     """
 
     name: str
@@ -94,24 +71,9 @@ class Panel:
 class Drawing:
     """Evidence drawn beside the record and the simulated stem; empty for a method without any.
 
-    Attributes
-    ----------
-    panels : tuple of Panel
-        Separate panels.
-    heading, caption, alt : str
-        Heading, caption and description of these panels in a report.
-    region : tuple of float or None
-        Part of their x axis that a report shades.
-    stem : tuple of Curve
-        Curves of stem position, m, over time, s.
-    stem_title : str
-        What the stem's panel shows.
-    loop : tuple of Curve
-        Curves of stem position, m, over the drive, Pa or N.
-    loop_title, loop_caption : str
-        What the loop shows, in a figure and in a report.
-    settings : mapping of str to str
-        Further settings, in words.
+    A report gives its panels a heading, a caption and, in `alt`, a description, and shades the
+    `region` of their x axis. The curves `stem` are of the stem position, m, over time, s, and those
+    of the `loop` of the stem position over the drive, Pa or N. Further `settings` are in words.
     """
 
     panels: tuple[Panel, ...] = ()

@@ -60,10 +60,7 @@ METHODS: Mapping[str, Method] = MappingProxyType(
 def method_named(name: str) -> Method:
     """Return the method of this name; names of earlier versions are understood.
 
-    Raises
-    ------
-    ValueError
-        If no method has this name; the message lists the names.
+    Raises ValueError with the names, if no method has this one.
     """
     current = current_name(name)
     if current not in METHODS:

@@ -59,18 +59,10 @@ class Support(Enum):
 class ModelComparison:
     """Two models of one record.
 
-    Attributes
-    ----------
-    log_ratio : float
-        Natural logarithm of the evidence for the first over that for the second.
-    rms : tuple of float
-        Root mean square residual of the stem under each model, m.
-    free : tuple of int
-        Free parameters of each.
-    samples, independent : float
-        Samples of the stem, and the equivalent number of independent samples.
-    describes : tuple of bool
-        Whether the residual of each model is no more than noise.
+    `log_ratio` is the natural logarithm of the evidence for the first over that for the second.
+    Each has an `rms` residual of the stem, m, a number of `free` parameters, and `describes` the
+    valve if its residual is no more than noise. The samples of the stem are worth `independent`
+    ones.
     """
 
     log_ratio: float
@@ -540,12 +532,9 @@ class Result:
         return rendering.frame_of(self.to_dict())
 
     def plot(self) -> "Figure":
-        """Draw the record, the model's stem and the evidence of the method.
+        """Draw the record, the model's stem and the evidence of the method, as a matplotlib figure.
 
-        Returns
-        -------
-        matplotlib.figure.Figure
-            A notebook shows it; ``savefig`` writes it.
+        A notebook shows it; ``savefig`` writes it.
         """
         from valve_friction_ros.figures import identification_figure  # noqa: PLC0415 - drawn above
 

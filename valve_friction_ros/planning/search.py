@@ -28,7 +28,7 @@ from valve_friction_ros.identification import (
     percentage,
 )
 from valve_friction_ros.identification.settings import SLIDING
-from valve_friction_ros.identification.trust.sliding import mean_sliding_friction
+from valve_friction_ros.identification.trust.uncertainty import mean_sliding_friction
 from valve_friction_ros.identification.trust.verdict import FALL_SPEED
 from valve_friction_ros.model.excitations import Excitation
 from valve_friction_ros.model.recording import Recording, SensorNoise, converter_response

@@ -132,13 +132,9 @@ def test_evidence(estimate):
     sample = replace(
         estimate, threshold=1.23456e-3, samples=789, sigma=0.123456, r_squared=0.98765432
     )
-    assert sweep_evidence(sample) == {
-        "threshold": 1.23456e-3,
-        "samples": 789,
-        "sigma": 0.123456,
-        "r_squared": 0.98765432,
-        "published_window": 33,
-    }
+    names = ("threshold", "samples", "sigma", "r_squared", "published_window")
+    values = (1.23456e-3, 789, 0.123456, 0.98765432, 33)
+    assert sweep_evidence(sample) == dict(zip(names, values, strict=True))
     assert sweep_finding(sample) == (
         "published: threshold δv 0.001235 m/s, 789 samples above it, σ_s 0.1235 N, R² 0.987654, "
         "window 33 samples"
@@ -419,14 +415,6 @@ class TestFixed:
         assert getattr(estimate, name) == fixed[name]
         assert estimate.fixed == (name,)
         assert_identified(estimate, LOW_FRICTION, NOISE_FREE | {"spring_preload": 1e-3})
-
-    def test_a_fixed_mass_makes_the_square_wave_enough(self, bench_record):
-        record = bench_record("low", SquareWave(), 20.8)
-        settings = IdentificationSettings(fixed={"mass": LOW_FRICTION.mass})
-        estimate = published_estimate(record, BENCH_VALVE, settings)
-        assert estimate.warnings == ()
-        tolerances = NOISE_FREE | {"spring_preload": 1e-3}
-        assert_identified(estimate, LOW_FRICTION, tolerances)
 
     def test_limit_velocity_sets_the_threshold(self, bench_record):
         record = bench_record("low", SineWave(), 71.0)

@@ -143,12 +143,6 @@ def test_against_least_squares_at_each_threshold(record, derivatives, form):
         np.testing.assert_array_equal(found.estimates[name], value)
 
 
-def test_four_columns_give_the_preload_by_the_bias(record, derivatives):
-    found = swept(record, derivatives, IdentificationSettings(position_bias=BIAS))
-    expected = found.estimates["spring_constant"] * BIAS
-    np.testing.assert_array_equal(found.estimates["spring_preload"], expected)
-
-
 def test_everything_fixed_leaves_only_the_residual(record, derivatives):
     fixed = {name: getattr(HIGH_FRICTION, name) for name in REGRESSED}
     found = swept(record, derivatives, IdentificationSettings(fixed=fixed))

@@ -97,14 +97,6 @@ def test_a_number_without_a_verdict_is_never_shown(value, width, doubt):
         assert low > 0 or high < 0
 
 
-@pytest.mark.parametrize(
-    ("name", "unit"), [("mass", "kg"), ("clock_offset", "s"), ("coulomb_asymmetry", "1")]
-)
-def test_units_for_people(name, unit):
-    assert fixed(name, 1.0).unit == unit
-    assert fixed("unheard_of", 1.0).unit == ""
-
-
 @given(
     st.one_of(st.integers(1, 2000), st.floats(1.0, 1e6)),
     st.floats(0.6, 1 - 1e-7),

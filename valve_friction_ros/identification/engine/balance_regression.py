@@ -35,8 +35,7 @@ from valve_friction_ros.identification.engine.sliding_averages import (
     averaged_twice,
 )
 from valve_friction_ros.identification.settings import SLIDING
-from valve_friction_ros.identification.trust.sliding import SPEED_EXPONENT
-from valve_friction_ros.identification.trust.uncertainty import MEDIAN_MAGNITUDE
+from valve_friction_ros.identification.trust.uncertainty import MEDIAN_MAGNITUDE, SPEED_EXPONENT
 from valve_friction_ros.model.valve import Valve
 
 _Array = NDArray[np.float64]

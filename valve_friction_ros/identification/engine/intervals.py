@@ -34,12 +34,12 @@ from valve_friction_ros.identification.engine.lags import (
 )
 from valve_friction_ros.identification.engine.posterior_fit import PosteriorFit
 from valve_friction_ros.identification.settings import SLIDING
-from valve_friction_ros.identification.trust.sliding import (
+from valve_friction_ros.identification.trust.uncertainty import (
     FINEST_SLIDING,
+    NORMAL_QUANTILE,
     mean_over_distance,
     mean_speed,
 )
-from valve_friction_ros.identification.trust.uncertainty import NORMAL_QUANTILE
 
 RECTANGLE = 1.0 / math.sqrt(3.0)
 """Standard deviation of a rectangular distribution over its half width."""

@@ -63,11 +63,13 @@ from valve_friction_ros.identification.trust.plausible_units import (
     require_plausible_units,
     time_remarks,
 )
-from valve_friction_ros.identification.trust.sliding import COMPARABLE, SPEED_EXPONENT, mean_speed
 from valve_friction_ros.identification.trust.uncertainty import (
+    COMPARABLE,
     CORRELATION,
+    SPEED_EXPONENT,
     Correlation,
     correlation_of,
+    mean_speed,
 )
 from valve_friction_ros.identification.trust.verdict import (
     BUDGET,

@@ -30,7 +30,7 @@ from valve_friction_ros.identification.result import Result
 from valve_friction_ros.identification.settings import SLIDING, UNITS, IdentificationSettings
 from valve_friction_ros.identification.trust import excitation
 from valve_friction_ros.identification.trust.plausible_units import require_plausible_units
-from valve_friction_ros.identification.trust.sliding import mean_speed
+from valve_friction_ros.identification.trust.uncertainty import mean_speed
 from valve_friction_ros.identification.trust.verdict import Parameter, Verdict, fixed
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve

@@ -40,8 +40,12 @@ from valve_friction_ros.identification.steps.validation import (
 )
 from valve_friction_ros.identification.trust import excitation
 from valve_friction_ros.identification.trust.plausible_units import require_plausible_units
-from valve_friction_ros.identification.trust.sliding import FINEST_SLIDING
-from valve_friction_ros.identification.trust.uncertainty import Jackknife, half_width, jackknife
+from valve_friction_ros.identification.trust.uncertainty import (
+    FINEST_SLIDING,
+    Jackknife,
+    half_width,
+    jackknife,
+)
 from valve_friction_ros.identification.trust.verdict import (
     FALL_SPEED,
     LEAST_FIT,

@@ -456,13 +456,7 @@ def breakaway_points(strokes: Sequence[SignatureStroke]) -> tuple[BreakawayPoint
 
 
 def mean_spring_constant(ways: Ways) -> float:
-    """Return k of (15), N/m, averaged over the strokes of both ways.
-
-    Raises
-    ------
-    RefusalError
-        If it is not above zero.
-    """
+    """Return k of (15), N/m, the mean over all strokes; RefusalError if it is not above zero."""
     found = float(np.mean([stroke.spring_constant for way in ways for stroke in way]))
     if not found > 0:
         raise RefusalError(

@@ -119,16 +119,9 @@ _MOVES = 4.0
 
 @dataclass(frozen=True, eq=False)
 class Validation:
-    """A measured and a simulated stem.
+    """A measured record and the stem position simulated at the same times, m, shape (n,).
 
-    Attributes
-    ----------
-    recording : Recording
-        The measured record.
-    simulated : ndarray of float, shape (n,)
-        Simulated stem position at the same times, m.
-    notes : tuple of str
-        Substitutes for values that the model lacks, one sentence each.
+    The notes name substitutes for values that the model lacks, one sentence each.
     """
 
     recording: Recording

@@ -94,10 +94,7 @@ Chosen: with fewer a stroke has no resting and sliding part, or the sample is a 
 def require_drive(recording: Recording, valve: Valve) -> None:
     """Refuse a recorded force for a valve with a diaphragm, or a pressure for a valve without one.
 
-    Raises
-    ------
-    ValueError
-        The message gives the remedy.
+    Raises ValueError with the remedy.
     """
     if recording.driven_by is not valve.driven_by:
         raise ValueError(

@@ -94,12 +94,8 @@ def require_plausible_units(
 ) -> None:
     """Refuse a record or a valve with a quantity that no control valve has.
 
-    A machine without a spring, a machine driven by a force, and a dead sensor are not judged.
-
-    Raises
-    ------
-    RefusalError
-        The message names the quantity, and the unit in which it would be ordinary.
+    A machine without a spring, a machine driven by a force, and a dead sensor are not judged. The
+    RefusalError names the quantity, and the unit in which it would be ordinary.
     """
     if (
         not _is_valve(recording, valve)

@@ -277,12 +277,9 @@ class Misfit:
     ----------
     fit : float
         Share of the movement that is reproduced, at most 1.
-    rms : float
-        Root mean square of the whole residual, sensor noise included, `unit`.
-    systematic : float
-        Part of it that the sensors' noise does not explain, `unit`.
-    tolerated : float
-        Largest systematic misfit that leaves the model without doubt, `unit`.
+    rms, systematic, tolerated : float
+        Root mean square of the whole residual, sensor noise included; its part that this noise does
+        not explain; and the largest such part that leaves the model without doubt, `unit`.
     unit : str
         ``m``; ``N`` where no stem is simulated.
     """
