@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Settings of an identification."""
+"""Settings of an identification, and the names and units of its parameters."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field

@@ -7,9 +7,10 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Coordinates in which the stem of a sliding valve is linear.
+"""Coordinates of the fit: imperfections of a plant with their priors, and a straight form of all.
 
-While it slides, the stem is at
+Each imperfection has a Gaussian prior about zero. Where the record does not determine it, the
+prior remains, and widens every interval that depends on it. While it slides, the stem is at
 
     x = F/k − F_0/k ∓ F_c/k − (F_v/k)·ẋ .
 

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Verdicts on the numbers of a fit with imperfections."""
+"""Verdicts on the numbers of a fit with imperfections, and sentences on the fit and its record."""
 
 import math
 from collections.abc import Mapping, Sequence

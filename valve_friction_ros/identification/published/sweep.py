@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The regression of the force balance, (3) to (7), and the sweep of δv, (6) to (8), (17), (18)."""
+"""Regression of the force balance, (3) to (7), sweep of δv, (6) to (8), (17), (18), and result."""
 
 import math
 from collections.abc import Mapping

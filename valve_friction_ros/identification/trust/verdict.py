@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Verdicts on identified numbers, and the uncertainty that area and sensor scales add to them."""
+"""Verdicts on identified numbers, their uncertainty by area and sensor scales, and the misfit."""
 
 import math
 from collections.abc import Mapping
