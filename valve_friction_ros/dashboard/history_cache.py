@@ -221,9 +221,7 @@ class HistoryCache:
         """
         if self._file is None:
             return ()
-        if is_journal:
-            return database.alarm_events(self._file, chosen, most)
-        return database.standing_alarms(self._file, chosen, most)
+        return database.alarm_events(self._file, chosen, most, is_standing=not is_journal)
 
     @property
     def is_file(self) -> bool:
