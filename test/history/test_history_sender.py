@@ -67,6 +67,13 @@ def wait_until_sent(sender):
     wait_until(lambda: sender.state.problem is None, lambda: sender.state)
 
 
+def sent(file, database):
+    """Send all that is written now; the history on the server."""
+    with sending(file, database) as sender:
+        wait_until_sent(sender)
+    return History(database)
+
+
 @pytest.fixture
 def history(tmp_path):
     return HistoryFile(tmp_path / "history.sqlite")
@@ -219,23 +226,18 @@ class TestFaults:
             process.stdout.close()
             assert len(history.entries()) > written
             written = len(history.entries())
-        with sending(history, database) as sender:
-            wait_until_sent(sender)
-        assert all_of(History(database)) == all_of(history)
-        assert all(one.is_same for one in copied(history.path, database))
+        assert all_of(sent(history, database)) == all_of(history)
+        assert is_same(copied(history.path, database))
 
     def test_all_is_sent_again_to_a_server_that_is_another(self, history, database, postgres):
         """What it has already, as after a kill before the file notes it, is not doubled."""
         fill(history)
-        with sending(history, database) as sender:
-            wait_until_sent(sender)
+        sent(history, database)
         change(history, "UPDATE mark SET value = 'another' WHERE name = 'sent_to'")
         other = HistoryServer(postgres.url(postgres.database()))
         for number, server in enumerate((database, other)):
             history.add(success(START + 50 + number))
-            with sending(history, server) as sender:
-                wait_until_sent(sender)
-            assert all_of(History(server)) == all_of(history)
+            assert all_of(sent(history, server)) == all_of(history)
 
     def test_a_full_disk_of_the_server(self, history, database, postgres):
         with sending(history, database) as sender:

@@ -132,15 +132,6 @@ def _is_bag_folder(folder: Path, files: list[str]) -> bool:
         return False
 
 
-def _can_be_written(name: str) -> bool:
-    """Return whether a name can be written on one line of UTF-8."""
-    try:
-        name.encode()
-    except UnicodeEncodeError:
-        return False
-    return name.isprintable()
-
-
 def find_recordings(folder: Path, *left_out: Path) -> Findings:
     """Find the recordings in a folder and its subfolders, on this machine or in a store.
 
@@ -178,7 +169,7 @@ def _findings(folder: Path, own: set[Path]) -> Findings:
             else:
                 recordings.append(path)
     found = [FoundRecording(path, path.relative_to(folder).as_posix()) for path in recordings]
-    strange = [one for one in found if not _can_be_written(one.name)]
+    strange = [one for one in found if not one.name.isprintable()]  # on one line of UTF-8
     skipped += [one.name for one in strange]
     good = sorted((one for one in found if one not in strange), key=lambda one: one.name)
     return Findings(tuple(good), tuple(sorted(skipped)))

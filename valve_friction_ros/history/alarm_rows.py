@@ -14,8 +14,6 @@ therefore never make a step twice, and a killed process makes a step completely 
 functions raise HistoryError if the history cannot be read or written.
 """
 
-import csv
-import io
 import math
 import threading
 import uuid
@@ -50,7 +48,7 @@ from valve_friction_ros.history.history import END_OF_TIME, History, HistoryFile
 from valve_friction_ros.history.place import file_state
 from valve_friction_ros.history.rows import oldest_kept, valve_id
 from valve_friction_ros.history.tables import joined, put
-from valve_friction_ros.outside_text import harmless
+from valve_friction_ros.outside_text import csv_text
 from valve_friction_ros.streams import utc
 
 _EVENT = tables.alarm_event
@@ -399,12 +397,8 @@ _CSV: dict[str, Callable[[KeptAlarmEvent], object]] = {
 
 def alarms_as_csv(events: Iterable[KeptAlarmEvent]) -> str:
     """Return events as CSV, one line per event, with times in ISO 8601 (UTC)."""
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(_CSV)
-    for one in events:
-        writer.writerow(harmless(cell(one)) for cell in _CSV.values())
-    return out.getvalue()
+    rows = ({name: cell(one) for name, cell in _CSV.items()} for one in events)
+    return csv_text([*_CSV], rows)
 
 
 def _iso(time: int | None) -> str:
