@@ -25,7 +25,7 @@ from local_server import certificate_pair
 from waiting import PATIENCE, wait_until
 
 from valve_friction_ros.commands import identify_folder
-from valve_friction_ros.fleet import cluster
+from valve_friction_ros.fleet import workers
 
 distributed = pytest.importorskip("distributed", reason="run `make venv-cluster`")
 dask = pytest.importorskip("dask")
@@ -170,7 +170,7 @@ def test_certificates_of_dask_configuration(folder, arguments, command, tmp_path
     parts = {f"tls_{part}_{what}": value for part in ("scheduler", "worker", "client")
              for what, value in (("cert", certificate), ("key", key))}  # fmt: skip
     security = distributed.Security(require_encryption=True, tls_ca_file=certificate, **parts)
-    monkeypatch.setattr(cluster, "_AWAY", 3.0)
+    monkeypatch.setattr(workers, "_AWAY", 3.0)
     with local_cluster(protocol="tls://", security=security, host="localhost") as secure:
         address = secure.scheduler_address
         assert address.startswith("tls://")
@@ -188,7 +188,7 @@ def test_certificates_of_dask_configuration(folder, arguments, command, tmp_path
 
 
 def test_refused_at_once(arguments, command, monkeypatch):
-    monkeypatch.setattr(cluster, "_AWAY", 0.5)
+    monkeypatch.setattr(workers, "_AWAY", 0.5)
     for words, message in (
         (("--scheduler", "tcp://127.0.0.1:9"), "tcp://127.0.0.1:9: no scheduler answers: "),
         (

@@ -124,7 +124,7 @@ def test_a_row_that_is_written_before_and_arrives_after_another_is_seen(database
     with writing(database) as early:
         with reading(files[1].path) as source:
             (part, *_) = PARTS
-            of_valve = part.table.c.valve_id == 1
+            of_valve = part.c.valve_id == 1
             rows = [(valve_id(early, VALVE), row) for _, row in rows_of(source, part, of_valve)]
         write_rows(early, part, rows)
         copied(files[2].path, database)

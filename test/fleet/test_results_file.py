@@ -188,14 +188,14 @@ def test_another_database_is_left_alone(tmp_path):
 def test_one_writer_at_a_time(tmp_path):
     path = tmp_path / "out.csv"
     with ResultsFile(path) as results:
-        with pytest.raises(ValueError, match="another run is writing it"):
-            ResultsFile(path)
-        results.append(rows_of(0, 1, "one"))
-        with pytest.raises(ValueError, match="another run is writing it"):
-            ResultsFile(path)
-        results.keep(lambda _: False)
-        with pytest.raises(ValueError, match="another run is writing it"):
-            ResultsFile(path)
+        for act in (
+            lambda: None,
+            lambda: results.append(rows_of(0, 1, "one")),
+            lambda: results.keep(lambda _: False),
+        ):
+            act()
+            with pytest.raises(ValueError, match="another run is writing it"):
+                ResultsFile(path)
     with ResultsFile(path) as results:
         assert recordings_in(results) == []
         with pytest.raises(ValueError, match="another run is writing it"):  # nothing was written
@@ -378,30 +378,23 @@ def test_names_of_reports_differ_where_valves_do():
 class TestFirstSurvey:
     """Valves without a baseline are ranked by absolute limits, and the row says what to do."""
 
-    def row(self, name, survey, dead_band):
-        cells = dict.fromkeys(COLUMNS)
-        return cells | {
-            "recording": name,
-            "valve": "",
-            "level": "OK",
-            "survey": survey,
-            "dead_band_of_travel": dead_band,
-        }
-
     def test_the_worst_first(self):
         rows = [
-            self.row("a", "good", 0.05),
-            self.row("b", "bad", 0.27),
-            self.row("c", "watch", 0.15),
-            self.row("d", "unknown", 0.9),
+            row(name, dead_band=dead_band, survey=survey)
+            for name, survey, dead_band in (
+                ("a", "good", 0.05),
+                ("b", "bad", 0.27),
+                ("c", "watch", 0.15),
+                ("d", "unknown", 0.9),
+            )
         ]
-        assert [row["recording"] for row in ranked(rows)] == ["b", "c", "a", "d"]
-        assert [status_of(row).word for row in ranked(rows)][:3] == ["bad", "watch", "good"]
+        assert [one["recording"] for one in ranked(rows)] == ["b", "c", "a", "d"]
+        assert [status_of(one).word for one in ranked(rows)][:3] == ["bad", "watch", "good"]
 
     def test_a_file_of_an_earlier_version_gets_the_columns(self, tmp_path):
         output = tmp_path / "friction.csv"
         with ResultsFile(output) as results:
-            results.append([self.row("a", None, 0.05)])
+            results.append([row("a", dead_band=0.05)])
         connection = sqlite3.connect(tmp_path / "friction.sqlite")
         connection.execute("ALTER TABLE result DROP COLUMN survey")
         connection.execute("ALTER TABLE result DROP COLUMN what_to_do")

@@ -17,7 +17,8 @@ import threading
 import pytest
 from dask_workers import answer, local_cluster
 
-from valve_friction_ros.fleet import DeadWorker, cluster, cluster_at, in_cluster, in_processes
+from valve_friction_ros.fleet import DeadWorker, cluster_at, in_cluster, in_processes
+from valve_friction_ros.fleet import workers as sharing
 
 
 def work(task):
@@ -111,13 +112,13 @@ def test_a_death_costs_its_own_task_only(workers, tmp_path):
 
 
 def test_what_is_handed_out_is_bounded(workers, monkeypatch):
-    sizes, kept = [], cluster._Run._hand_out
+    sizes, kept = [], sharing._Run._hand_out
 
     def hand_out(run, tasks, is_alone=False):
         kept(run, tasks, is_alone)
         sizes.append((len(tasks), len(run._out)))
 
-    monkeypatch.setattr(cluster._Run, "_hand_out", hand_out)
+    monkeypatch.setattr(sharing._Run, "_hand_out", hand_out)
     found = in_cluster(workers, answer, [f"{number}" for number in range(300)], never)
     assert len(list(found)) == 300
     assert sum(size for size, _ in sizes) == 300
@@ -137,8 +138,8 @@ def test_stopped_while_a_worker_is_busy(workers, tmp_path):
 
 def test_workers_of_another_version_are_refused(workers, monkeypatch):
     assert workers.compare() == []
-    own = cluster.__version__
-    monkeypatch.setattr(cluster, "__version__", "0.0.1")  # a worker that comes later
+    own = sharing.__version__
+    monkeypatch.setattr(sharing, "__version__", "0.0.1")  # a worker that comes later
     with pytest.raises(ValueError, match=f"{socket.gethostname()} has valve_friction_ros {own}"):
         list(in_cluster(workers, answer, "a", never))
     with pytest.raises(ValueError, match=rf"tcp://\S+ has valve_friction_ros {own}\)"):
@@ -146,8 +147,8 @@ def test_workers_of_another_version_are_refused(workers, monkeypatch):
 
 
 def test_other_versions_of_libraries_are_noted(workers, monkeypatch):
-    theirs = cluster.versions()["numpy"]
-    monkeypatch.setattr(cluster.metadata, "version", lambda _: "1.0")
+    theirs = sharing.versions()["numpy"]
+    monkeypatch.setattr(sharing.metadata, "version", lambda _: "1.0")
     notes = workers.compare()
     assert (
         f"workers have numpy {theirs}, and this machine has 1.0: the last digits of results may "
@@ -156,8 +157,7 @@ def test_other_versions_of_libraries_are_noted(workers, monkeypatch):
 
 
 def test_the_last_worker_goes(monkeypatch):
-    monkeypatch.setattr(cluster, "NO_WORKER", 0.5)
-    monkeypatch.setattr(cluster, "NO_WORKER", 0.5)
+    monkeypatch.setattr(sharing, "NO_WORKER", 0.5)
     with local_cluster(workers=0) as empty, cluster_at(empty.scheduler_address) as found:
         with pytest.raises(ValueError, match=r"no worker has come in 0\.5 s: start some by `dask"):
             found.compare()
@@ -182,7 +182,7 @@ def test_the_scheduler_goes(tmp_path):
 
 
 def test_no_scheduler(monkeypatch):
-    monkeypatch.setattr(cluster, "_AWAY", 0.5)
+    monkeypatch.setattr(sharing, "_AWAY", 0.5)
     for address in ("tcp://127.0.0.1:9", "nowhere", "odd://127.0.0.1:9"):
         with (
             pytest.raises(ValueError, match=f"^{address}: no scheduler answers: [^\n]*$"),

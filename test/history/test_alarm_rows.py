@@ -12,16 +12,12 @@
 import csv
 import io
 import signal
-import sqlite3
-import subprocess
-import sys
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import closing
-from pathlib import Path
 
 import pytest
 from full_history import all_of
-from histories import DAY, OTHER, SECOND, START, VALVE
+from histories import DAY, OTHER, SECOND, START, VALVE, make_version, select
+from writers import writer
 
 from valve_friction_ros.health import (
     AlarmAction,
@@ -42,13 +38,11 @@ from valve_friction_ros.history import (
     KeptValve,
     alarm_events,
     alarms_as_csv,
-    area_of,
     copied,
     follow_alarms,
     read_alarms,
     request_alarms,
     request_many,
-    standing_alarms,
     tables,
 )
 from valve_friction_ros.history.database import writing
@@ -56,8 +50,6 @@ from valve_friction_ros.history.outbox import count_unsent, follow
 from valve_friction_ros.history.rows import valve_id
 from valve_friction_ros.history.tables import put
 
-HERE = Path(__file__).parent
-WRITER = HERE / "alarm_writer.py"
 HIGH, DATA = AlarmKind.FRICTION_HIGH, AlarmKind.DATA_QUALITY
 WARN = Condition(Level.WARN, StatusSignal.MAINTENANCE_REQUIRED, "friction has grown")
 FAULT = Condition(Level.WARN, StatusSignal.CHECK_FUNCTION, "no sample of the stem")
@@ -99,40 +91,22 @@ def test_old_events_go_and_the_alarm_stays(history):
     assert read_alarms(history, VALVE.name)[HIGH].state is AlarmState.UNACKNOWLEDGED
 
 
-def killed(path, step):
-    done = subprocess.run(
-        [sys.executable, str(WRITER), str(path), "A. Operator", str(step)],
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=300,
-    )
-    return done.returncode, len(done.stdout.split("\n")) - 1
-
-
-@pytest.mark.parametrize("step", range(10))
+@pytest.mark.parametrize("step", [0, 1, 4, 9])
 def test_a_process_killed_within_a_step_has_made_all_before_it_and_not_it(history, step):
     history.prepare()
-    code, finished = killed(history.path, step)
-    assert (code, finished) == (-signal.SIGKILL, step)
+    with writer("alarms", history.path, "A. Operator", step) as process:
+        told, _ = process.communicate(timeout=300)
+    assert (process.returncode, len(told.splitlines())) == (-signal.SIGKILL, step)
     events = [one.event for one in reversed(alarm_events(history))]
     assert [one.time for one in events] == [START + SECOND * k for k in range(step)]
     alarms = read_alarms(history, VALVE.name)
     assert alarms.get(HIGH) == (events[-1].alarm if events else None)
-    with closing(sqlite3.connect(history.path)) as connection:
-        assert connection.execute("PRAGMA integrity_check").fetchall() == [("ok",)]
+    assert select(history, "PRAGMA integrity_check") == [("ok",)]
 
 
 def test_two_processes_make_one_chain_and_lose_no_step(history):
     """Both do the same to one alarm; one of them is killed in the midst of it."""
-    both = [
-        subprocess.Popen(
-            [sys.executable, str(WRITER), str(history.path), name],
-            stdout=subprocess.PIPE,
-            text=True,
-        )
-        for name in ("A", "B")
-    ]
+    both = [writer("alarms", history.path, name) for name in ("A", "B")]
     finished = {"A": 0, "B": 0}
     try:
         for name, process in zip("AB", both, strict=True):
@@ -147,9 +121,7 @@ def test_two_processes_make_one_chain_and_lose_no_step(history):
             process.kill()
             process.wait()
             process.stdout.close()
-    with closing(sqlite3.connect(history.path)) as connection:
-        query = "SELECT state_before, action, state, who FROM alarm_event ORDER BY id"
-        rows = connection.execute(query).fetchall()
+    rows = select(history, "SELECT state_before, action, state, who FROM alarm_event ORDER BY id")
     state = AlarmState.NORMAL
     for before, action, after, _ in rows:
         assert AlarmState[before] is state
@@ -161,75 +133,59 @@ def test_two_processes_make_one_chain_and_lose_no_step(history):
 
 
 def test_a_followed_file_of_version_8_opens_and_sends_alarms(tmp_path):
-    path = tmp_path / "history.sqlite"
-    with closing(sqlite3.connect(path)) as connection:
-        connection.executescript((HERE / "history_of_version_8.sql").read_text())
-    history = HistoryFile(path)
+    history = make_version(8, HistoryFile(tmp_path / "history.sqlite"))
     before = all_of(history)
     assert len(history.entries()) == 6
     assert read_alarms(history, VALVE.name) == {}
-    assert standing_alarms(history) == ()
+    assert alarm_events(history, is_standing=True) == ()
     follow_alarms(history, VALVE, {HIGH: WARN}, START)
-    assert count_unsent(path).waiting == 0
-    follow(path)
-    assert count_unsent(path).waiting == 1, "what came before it was followed"
+    assert count_unsent(history.path).waiting == 0
+    follow(history.path)
+    assert count_unsent(history.path).waiting == 1, "what came before it was followed"
     follow_alarms(history, VALVE, {DATA: FAULT}, START)
-    follow(path)
-    assert count_unsent(path).waiting == 2
+    follow(history.path)
+    assert count_unsent(history.path).waiting == 2
     assert [one for one in all_of(history) if one not in before] != []
 
 
 # Lists
 
 
-def event_row(connection, valve, uid):
-    return {
-        "valve_id": valve_id(connection, valve),
-        "uid": uid,
-        "time_ns": START,
-        "kind": HIGH.value,
-        "action": "RAISE",
-        "state_before": "NORMAL",
-        "state": "UNACKNOWLEDGED",
-        "level": 1,
-        "status_signal": "M",
-        "message": "friction has grown",
-        "raised_ns": START,
-        "until_ns": None,
-        "who": "",
-        "text": "",
-    }
-
-
-def fill_many(place, count):
-    """Write events of 500 valves in ten areas, as `follow_alarms` does, in one transaction."""
-    kinds, states = [*AlarmKind], [*AlarmState]
-    valves = [KeptValve(f"/area_{k % 10}/fv_{k}/identifier", f"FV-{k}") for k in range(500)]
+def fill_many(place, valves, count):
+    """Write events of valves, as `follow_alarms` does, in one transaction."""
+    kinds, states, number = [*AlarmKind], [*AlarmState], len(valves)
     with writing(place) as connection:
         ids = [valve_id(connection, one) for one in valves]
         rows = []
         for k in range(count):
-            state = states[k % 6]
+            state = states[k % 6] if count > number else AlarmState.UNACKNOWLEDGED
             level = int(state in (AlarmState.UNACKNOWLEDGED, AlarmState.ACKNOWLEDGED))
             rows.append(
-                event_row(connection, valves[0], f"{k}")
-                | {
-                    "valve_id": ids[k % 500],
+                {
+                    "valve_id": ids[k % number],
+                    "uid": f"{k}",
                     "time_ns": START + k * 60 * SECOND,
-                    "kind": kinds[k // 500 % 6].value,
+                    "kind": kinds[k // number % 6].value,
+                    "action": "RAISE",
+                    "state_before": "NORMAL",
                     "state": state.name,
                     "level": level,
                     "status_signal": "M" if level else "",
                     "message": f"friction has grown by {k % 100} %",
+                    "raised_ns": START,
                     "until_ns": START + DAY if state.is_suppressed else None,
                     "who": "A. Operator" if k % 7 == 0 else "",
+                    "text": "",
                 }
             )
         put(connection, tables.alarm_event, rows)
 
 
+PLANT = [KeptValve(f"/area_{k % 10}/fv_{k}/identifier", f"FV-{k}") for k in range(500)]
+
+
 def test_ten_thousand_events_are_listed_and_filtered(history):
-    fill_many(history.path, 10_000)
+    fill_many(history.path, PLANT, 10_000)
     everything = alarm_events(history)
     assert len(everything) == 10_000
     some = AlarmFilter(
@@ -249,7 +205,7 @@ def test_ten_thousand_events_are_listed_and_filtered(history):
         and one.event.time >= some.since
     ]
     assert found == tuple(expected)
-    standing = standing_alarms(history)
+    standing = alarm_events(history, is_standing=True)
     last = {(one.valve, one.event.alarm.kind): one for one in reversed(everything)}
     assert {*standing} == {
         one for one in last.values() if one.event.alarm.state is not AlarmState.NORMAL
@@ -291,9 +247,13 @@ def test_the_csv_has_a_line_for_each_event_and_no_formula(history):
     assert rows[0]["area"] == "/"
 
 
-def test_the_area_is_what_the_namespace_lies_in():
-    assert area_of("/plant/unit_3/fv_101/identifier") == "/plant/unit_3"
-    assert area_of("/fv_101/identifier") == "/"
+@pytest.mark.parametrize(
+    ("name", "area"),
+    [("/plant/unit_3/fv_101/identifier", "/plant/unit_3"), ("/fv_101/identifier", "/")],
+)
+def test_the_area_is_what_the_namespace_lies_in(history, name, area):
+    follow_alarms(history, KeptValve(name, ""), {HIGH: WARN}, START)
+    assert alarm_events(history)[0].area == area
 
 
 def test_a_server_has_the_same(history, database):
@@ -301,7 +261,8 @@ def test_a_server_has_the_same(history, database):
     request_alarms(history, VALVE, HIGH, ACKNOWLEDGED, START + SECOND)
     copied(history.path, database)
     assert alarm_events(History(database)) == alarm_events(history)
-    assert standing_alarms(History(database)) == standing_alarms(history)
+    standing = alarm_events(History(database), is_standing=True)
+    assert standing == alarm_events(history, is_standing=True)
     found = alarm_events(History(database), AlarmFilter(words="OPERATOR", area="/"))
     assert len(found) == 1
 
@@ -333,10 +294,8 @@ def test_alarms_on_a_server_are_answered_once_unless_a_file_keeps_them(history, 
 
 
 def test_five_hundred_are_acknowledged_at_once_and_their_nodes_learn_it(history):
-    valves = [KeptValve(f"/area/fv_{k}/identifier", f"FV-{k}") for k in range(500)]
-    with writing(history.path) as connection:
-        rows = [event_row(connection, one, one.tag) for one in valves]
-        put(connection, tables.alarm_event, rows)
+    valves = PLANT
+    fill_many(history.path, valves, len(valves))
     feed = AlarmFeed(history.path)
     feed.look()
     asked = [(one, HIGH) for one in valves]

@@ -16,15 +16,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from full_history import NUMBERS, SLIDING, all_of, all_of_valve, fill
 from histories import (
     DAY,
     OTHER,
     SECOND,
     START,
     VALVE,
+    change,
+    make_version,
     make_version_5,
     parameter,
     refused,
+    select,
     success,
 )
 from hypothesis import given
@@ -36,7 +40,6 @@ from valve_friction_ros.health import (
     Level,
     Measured,
     MonitorSettings,
-    SlidingFriction,
 )
 from valve_friction_ros.history import (
     HistoryError,
@@ -57,31 +60,34 @@ def history(tmp_path):
     return HistoryFile(tmp_path / "folder" / "a file ?#%.sqlite")
 
 
-SLIDING = SlidingFriction(205.5, 3.25, 9.5e-3)
-
-
-VERSION_2 = Path(__file__).with_name("history_of_version_2.sql").read_text()
-"""Identifications, a refusal and baselines, as dumped by that version."""
-
 OF_VERSION_2 = {
     "version": "0.1.0",
-    "settings": re.search(r"INTO \"settings\" VALUES\(1,'(.*)'\);", VERSION_2)[1],
+    "settings": re.search(
+        r"INTO \"settings\" VALUES\(1,'(.*)'\);",
+        Path(__file__).with_name("history_of_version_2.sql").read_text(),
+    )[1],
 }
 
 
-def write_version_2(history):
-    history.path.parent.mkdir(parents=True, exist_ok=True)
-    connection = sqlite3.connect(history.path)
-    connection.executescript(VERSION_2)
-    connection.close()
-
-
-def select(history, query):
-    connection = sqlite3.connect(history.path)
-    try:
-        return connection.execute(query).fetchall()
-    finally:
-        connection.close()
+def make_old(version, history):
+    """Make a file of an older version: as it dumped one, or without what later ones know."""
+    if version in (2, 6, 7, 8):
+        return make_version(version, history)
+    if version == 1:
+        make_version(2, history)
+        change(history, "ALTER TABLE parameter DROP COLUMN published; PRAGMA user_version = 1")
+        return history
+    for valve in (VALVE, OTHER):
+        fill(history, valve)
+    make_version_5(history)
+    if version < 5:  # who set a baseline, and what it replaced
+        columns = select(history, "SELECT name FROM pragma_table_info('baseline')")
+        new = [one for (one,) in columns if one.startswith("replaced_")]
+        for name in (*new, "set_by", "level", "withdrawn"):
+            change(history, f"ALTER TABLE baseline DROP COLUMN {name}; PRAGMA user_version = 4")
+    if version < 4:
+        change(history, "DROP TABLE baseline_record; PRAGMA user_version = 3")
+    return history
 
 
 def same(found, expected):
@@ -120,21 +126,28 @@ def test_a_trend_leaves_the_calibration_out(history):
     assert found.point() == entry.point() == point
 
 
-def test_a_file_of_version_1_is_read_and_extended(history):
-    """Version 1 had no published values; a file that is only read stays as it is."""
-    write_version_2(history)
-    connection = sqlite3.connect(history.path)
-    connection.execute("ALTER TABLE parameter DROP COLUMN published")
-    connection.execute("PRAGMA user_version = 1")
-    connection.close()
-    old = history.entries()
-    assert same(old[0], success(**OF_VERSION_2))
-    assert select(history, "PRAGMA user_version") == [(1,)]
-    friction = replace(parameter("coulomb_friction", 150.0), published=151.0)
-    new = success(START + 9 * DAY, parameters={"coulomb_friction": friction})
-    history.add(new)
-    assert all(map(same, history.entries(), (*old, new)))
-    assert select(history, "PRAGMA user_version") == [(tables.SCHEMA_VERSION,)]
+def version(history):
+    return select(history, "PRAGMA user_version")[0][0]
+
+
+@pytest.mark.parametrize("number", range(1, tables.SCHEMA_VERSION))
+def test_a_file_of_an_older_version_is_read_as_it_is_and_extended(number, history, tmp_path):
+    """Reading changes nothing; what is written then is kept as in a new file."""
+    make_old(number, history)
+    before, entries = all_of(history), history.entries()
+    assert entries
+    kept = history.baseline(VALVE.name)
+    assert version(history) == number
+    history.prepare()
+    assert version(history) == tables.SCHEMA_VERSION
+    assert same(history.entries(), entries)
+    assert history.baseline(VALVE.name).baseline == kept.baseline
+    assert number < 5 or all_of(history) == before  # they do not say what a baseline replaced
+    third, new = KeptValve("/fv_9/identifier", "FV-9"), HistoryFile(tmp_path / "new.sqlite")
+    for one in (history, new):
+        fill(one, third)
+    assert all_of_valve(history, third) == all_of_valve(new, third)
+    assert select(history, "PRAGMA foreign_key_check") == []
 
 
 @pytest.mark.parametrize("driven_by", Drive)
@@ -159,22 +172,6 @@ def test_records_go_with_their_baselines(history):
     assert history.baseline(VALVE.name).record is None
     history.add(success(START + 30 * DAY), days=1.0)
     assert select(history, "SELECT count(*) FROM baseline_record") == [(0,)]
-
-
-def make_version_4(history):
-    """Take away what version 5 knows of a baseline, who set it and what it replaced, and 6."""
-    make_version_5(history)
-    columns = [
-        name for (name,) in select(history, "SELECT name FROM pragma_table_info('baseline')")
-    ]
-    new = [one for one in columns if one.startswith("replaced_")] + ["set_by", "level", "withdrawn"]
-    connection = sqlite3.connect(history.path)
-    drop = "".join(f"ALTER TABLE baseline DROP COLUMN {name};" for name in new)
-    connection.executescript(f"{drop} PRAGMA user_version = 4")
-    connection.close()
-
-
-NUMBERS = {"spring_constant": Measured(2.05e5, 40.0), "lag": Measured(-0.002, 0.003)}
 
 
 def test_the_numbers_of_baseline_and_identification_are_kept(history):
@@ -213,108 +210,48 @@ def test_the_newest_measurement_of_each_number_is_known_after_a_restart(history)
     history.add(success(START + 3, numbers=repaired))
     known = history.known_numbers(VALVE.name, BENCH_VALVE, START)
     assert known.numbers == NUMBERS | {"lag": within["lag"]} | repaired
-    make_version_5(history)
-    assert history.known_numbers(VALVE.name, BENCH_VALVE, 0).numbers == {}
 
 
-def test_a_file_of_version_5_is_read_and_extended(history):
-    """Version 5 had no numbers of a valve beside its friction."""
-    kept = KeptBaseline(Baseline(150.0, numbers=NUMBERS), START, START)
-    history.set_baseline(VALVE, kept)
-    history.add(success(numbers=NUMBERS))
-    make_version_5(history)
-    assert history.baseline(VALVE.name).baseline.numbers == {}
-    assert history.last_success(VALVE.name).numbers == {}
-    assert select(history, "PRAGMA user_version") == [(5,)]
-    history.set_baseline(VALVE, replace(kept, time=START + 1))
-    assert select(history, "PRAGMA user_version") == [(tables.SCHEMA_VERSION,)]
-    assert history.baseline(VALVE.name).baseline.numbers == NUMBERS
-    assert history.baseline(VALVE.name, until=START + 1).baseline.numbers == {}
-
-
-def test_a_file_of_version_4_is_read_and_extended(history):
-    """Version 4 did not say what a baseline replaced: it is that of the row before."""
-    first = KeptBaseline(Baseline(150.0, 2.0, SLIDING), START, START)
-    second = KeptBaseline(Baseline(600.0, 7.0), START + 1, START)
-    for valve, kept in ((VALVE, first), (OTHER, second), (VALVE, second)):
-        history.set_baseline(valve, kept)
-    entry = success(baseline=first.baseline)
-    history.add(entry)
-    make_version_4(history)
-    assert history.baselines(VALVE.name) == (first, second)
-    assert same(history.last_success(VALVE.name), entry)
-    assert select(history, "PRAGMA user_version") == [(4,)]
+def test_a_baseline_of_version_4_replaced_that_of_the_row_before(history):
+    make_old(4, history)
+    change(history, "UPDATE baseline SET coulomb_friction = 100 + id")
+    assert [one.replaced for one in history.baselines(VALVE.name)] == [None, None]
     history.prepare()
-    assert select(history, "PRAGMA user_version") == [(tables.SCHEMA_VERSION,)]
-    assert history.baselines(VALVE.name) == (first, replace(second, replaced=first.baseline))
-    assert history.baselines(OTHER.name) == (second,)
+    for valve in (VALVE, OTHER):
+        first, second = history.baselines(valve.name)
+        assert (first.replaced, second.replaced) == (None, first.baseline)
 
 
-def test_a_file_of_version_3_is_read_and_extended(history):
-    """Version 3 had no records of baselines."""
-    kept = KeptBaseline(Baseline(150.0), START, START)
-    history.set_baseline(VALVE, kept)
-    make_version_4(history)
-    connection = sqlite3.connect(history.path)
-    connection.executescript("DROP TABLE baseline_record; PRAGMA user_version = 3")
-    connection.close()
-    assert history.baseline(VALVE.name) == kept
-    record = Recording(0.01, np.arange(100.0), np.arange(100.0))
-    history.set_baseline(VALVE, replace(kept, time=START + 1, record=record))
-    assert select(history, "PRAGMA user_version") == [(tables.SCHEMA_VERSION,)]
-    assert len(history.baseline(VALVE.name).record) == 100
-
-
-class TestVersion2:
-    """A file that the last version without sliding friction in its baselines wrote."""
-
-    BASELINE = Baseline(140.0, 2.0)
-    ENTRIES = (
+@pytest.mark.parametrize("number", [1, 2])
+def test_what_the_first_versions_hold(number, history):
+    """They have no sliding friction in their baselines, and version 1 no published values."""
+    make_old(number, history)
+    baseline = Baseline(140.0, 2.0)
+    expected = (
         success(**OF_VERSION_2),
-        success(START + DAY, 210.0, 4.0, baseline=BASELINE, **OF_VERSION_2),
+        success(START + DAY, 210.0, 4.0, baseline=baseline, **OF_VERSION_2),
         refused(START + 2 * DAY, **OF_VERSION_2),
     )
+    assert all(map(same, history.entries(), expected))
+    assert history.baseline(VALVE.name) == KeptBaseline(baseline, START + 5, START)
+    assert history.baseline(OTHER.name).baseline == Baseline(600.0, 7.0)
+    points = history.points(VALVE.name, "bench", baseline=baseline)
+    assert points == (DatedNumber(START, 150.0, 3.0), DatedNumber(START + DAY, 210.0, 4.0))
 
-    def is_whole(self, history):
-        assert all(map(same, history.entries(), self.ENTRIES))
-        assert history.baseline(VALVE.name) == KeptBaseline(self.BASELINE, START + 5, START)
-        assert history.baseline(OTHER.name).baseline == Baseline(600.0, 7.0)
-        points = history.points(VALVE.name, "bench", baseline=self.BASELINE)
-        assert points == (DatedNumber(START, 150.0, 3.0), DatedNumber(START + DAY, 210.0, 4.0))
-        return True
 
-    def test_it_is_read_as_it_is(self, history):
-        write_version_2(history)
-        assert self.is_whole(history)
-        assert select(history, "PRAGMA user_version") == [(2,)]
-
-    def test_it_is_extended_by_the_first_change(self, history):
-        write_version_2(history)
-        history.prepare()
-        assert self.is_whole(history)
-        assert select(history, "PRAGMA user_version") == [(tables.SCHEMA_VERSION,)]
-        assert select(history, "PRAGMA foreign_key_check") == []
-        kept = KeptBaseline(Baseline(sliding=SLIDING), START + 3 * DAY, START)
-        history.set_baseline(VALVE, kept)
-        assert history.baseline(VALVE.name) == kept
-        new = success(START + 3 * DAY, baseline=kept.baseline, sliding=SLIDING)
-        history.add(new)
-        assert same(history.entries()[-1], new)
-
-    def test_it_then_has_the_tables_of_a_new_file(self, history, tmp_path):
-        write_version_2(history)
-        history.prepare()
-        new = HistoryFile(tmp_path / "new.sqlite")
-        new.prepare()
-        for table in tables.METADATA.tables:
-            info = f"pragma_table_info('{table}') WHERE name != 'id'"
-            columns = f'SELECT name, type, "notnull" FROM {info}'
-            assert sorted(select(history, columns)) == sorted(select(new, columns))
-        of = "SELECT sql FROM sqlite_master WHERE name = 'friction'"
-        assert select(history, of) == select(new, of)
-        indices = "SELECT name, sql FROM sqlite_master WHERE type = 'index' AND sql NOT NULL"
-        found, expected = (sorted(select(one, indices)) for one in (history, new))
-        assert [one for one in expected if one[0] != "settings_content"] == found
+def test_a_file_of_version_2_then_has_the_tables_of_a_new_one(history, tmp_path):
+    make_old(2, history).prepare()
+    new = HistoryFile(tmp_path / "new.sqlite")
+    new.prepare()
+    for table in tables.METADATA.tables:
+        info = f"pragma_table_info('{table}') WHERE name != 'id'"
+        columns = f'SELECT name, type, "notnull" FROM {info}'
+        assert sorted(select(history, columns)) == sorted(select(new, columns))
+    of = "SELECT sql FROM sqlite_master WHERE name = 'friction'"
+    assert select(history, of) == select(new, of)
+    indices = "SELECT name, sql FROM sqlite_master WHERE type = 'index' AND sql NOT NULL"
+    found, expected = (sorted(select(one, indices)) for one in (history, new))
+    assert [one for one in expected if one[0] != "settings_content"] == found
 
 
 @given(
@@ -468,13 +405,12 @@ class TestLastSuccess:
             "identification SET status_signal = 'X'",
             "identification SET warn_ratio = 'much'",
             "parameter SET name = 'friction' WHERE name = 'coulomb_friction'",
+            "parameter SET verdict = 'perhaps'",
         ],
     )
     def test_a_row_that_holds_none_is_an_error(self, history, damage):
         history.add(success())
-        connection = sqlite3.connect(history.path)
-        connection.executescript(f"PRAGMA ignore_check_constraints = ON; UPDATE {damage}")
-        connection.close()
+        change(history, f"UPDATE {damage}")
         with pytest.raises(HistoryError, match="a row holds no result"):
             history.last_success(VALVE.name)
 
@@ -494,15 +430,6 @@ class TestRetention:
         history.add(success(0))
         history.add(success(START), days=0)
         assert len(history.entries()) == 2
-
-    def test_the_file_does_not_grow_any_more(self, history):
-        """Pages of what was forgotten are used again."""
-        sizes = []
-        for day in range(200):
-            history.add(success(START + (day - 200) * DAY), days=20)
-            sizes.append(history.path.stat().st_size)
-        assert len(history.entries()) == 21
-        assert sizes[-1] == sizes[60]
 
     def test_a_time_ahead_of_the_clock_ages_nothing(self, history):
         """As where a clock was set wrong by a century."""
@@ -536,23 +463,17 @@ class TestSql:
             ("2026-09-21T14:13:21Z", name, tag, None, None, None, None, 0, "no motion"),
         ]
 
-    def test_what_is_not_known_is_null(self, history):
+    def test_what_is_not_known_is_null_and_settings_are_json(self, history):
         history.add(success())
         query = "SELECT value, verdict FROM parameter WHERE name = 'static_friction'"
         assert select(history, query) == [(None, "not identifiable")]
-
-    def test_settings_are_json(self, history):
-        history.add(success())
         query = "SELECT json_extract(content, '$.valve.diaphragm_area') FROM settings"
         assert select(history, query) == [(0.0445,)]
 
-    def test_versions(self, history):
-        history.prepare()
-        assert select(history, "PRAGMA user_version") == [(tables.SCHEMA_VERSION,)]
-        assert select(history, "PRAGMA journal_mode") == [("wal",)]
-
-    def test_no_row_without_its_valve(self, history):
+    def test_a_new_file(self, history):
         history.add(success())
+        assert version(history) == tables.SCHEMA_VERSION
+        assert select(history, "PRAGMA journal_mode") == [("wal",)]
         assert select(history, "PRAGMA foreign_key_check") == []
 
 

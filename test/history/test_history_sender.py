@@ -11,22 +11,32 @@
 
 import math
 import signal
-import sqlite3
 import subprocess
 import sys
 import threading
 import time
-from contextlib import closing, contextmanager
 from pathlib import Path
 
 import pytest
 from full_history import BUILT, all_of, answer, fill, filled, service_move
-from histories import DAY, OTHER, START, VALVE, make_version_5, refused, success
+from histories import (
+    DAY,
+    OTHER,
+    START,
+    VALVE,
+    change,
+    make_version,
+    make_version_5,
+    refused,
+    success,
+)
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from postgres import database_of, sending
 from waiting import wait_until
+from writers import writer
 
-from valve_friction_ros.health import Baseline, Level
+from valve_friction_ros.health import Baseline, Level, Measured
 from valve_friction_ros.history import (
     History,
     HistoryError,
@@ -47,17 +57,7 @@ from valve_friction_ros.history import (
 )
 from valve_friction_ros.history.outbox import count_unsent, follow
 
-HERE = Path(__file__).parent
-WRITER = HERE / "sending_writer.py"
-
-
-@contextmanager
-def sending(file, server):
-    sender = sender_of(file.path, server)
-    try:
-        yield sender
-    finally:
-        sender.end()
+PROJECT = Path(__file__).parents[2]
 
 
 def wait_until_sent(sender):
@@ -67,13 +67,21 @@ def wait_until_sent(sender):
     wait_until(lambda: sender.state.problem is None, lambda: sender.state)
 
 
+def sent(file, database):
+    """Send all that is written now; the history on the server."""
+    with sending(file, database) as sender:
+        wait_until_sent(sender)
+    return History(database)
+
+
 @pytest.fixture
 def history(tmp_path):
     return HistoryFile(tmp_path / "history.sqlite")
 
 
-def database_of(server):
-    return server.url.rpartition("/")[2]
+@pytest.fixture
+def full(tmp_path):
+    return filled(tmp_path)
 
 
 def test_what_was_there_and_what_comes_arrives(history, database):
@@ -134,9 +142,7 @@ def test_each_row_waits_once_since_it_first_changed(history):
     count = count_unsent(history.path)
     assert count.waiting == 3  # the valve, its level, an identification
     assert before - 60 < count.since <= before
-    with closing(sqlite3.connect(history.path)) as connection:
-        connection.execute("UPDATE unsent SET since = 5 WHERE part = 'told_level'")
-        connection.commit()
+    change(history, "UPDATE unsent SET since = 5 WHERE part = 'told_level'")
     keep_told_level(history, VALVE, Level.OK)
     assert count_unsent(history.path) == (3, 5, 0)
 
@@ -212,11 +218,7 @@ class TestFaults:
         """At any instant, also between the server's commit and what the file notes of it."""
         written, folder, name = 0, history.path.parent, history.path.name
         for run in range(3):
-            process = subprocess.Popen(
-                [sys.executable, WRITER, folder, database.url, "1000000", f"{name}={run}"],
-                stdout=subprocess.PIPE,
-                text=True,
-            )
+            process = writer("sent", folder, database.url, 1_000_000, f"{name}={run}")
             for _ in range(30 + 17 * run):
                 assert process.stdout.readline().strip()
             process.send_signal(signal.SIGKILL)
@@ -224,38 +226,18 @@ class TestFaults:
             process.stdout.close()
             assert len(history.entries()) > written
             written = len(history.entries())
-        with sending(history, database) as sender:
-            wait_until_sent(sender)
-        assert all_of(History(database)) == all_of(history)
-        assert all(one.is_same for one in copied(history.path, database))
+        assert all_of(sent(history, database)) == all_of(history)
+        assert is_same(copied(history.path, database))
 
-    def test_what_is_sent_twice_changes_nothing(self, history, database):
-        """As after a kill between the server's commit and what the file notes of it."""
+    def test_all_is_sent_again_to_a_server_that_is_another(self, history, database, postgres):
+        """What it has already, as after a kill before the file notes it, is not doubled."""
         fill(history)
-        with sending(history, database) as sender:
-            wait_until_sent(sender)
-        before = all_of(History(database))
-        with closing(sqlite3.connect(history.path)) as connection:
-            connection.execute("UPDATE mark SET value = 'another' WHERE name = 'sent_to'")
-            connection.commit()
-        history.add(success(START + 50))
-        with sending(history, database) as sender:
-            wait_until_sent(sender)
-        after = all_of(History(database))
-        assert len(History(database).entries()) == 4
-        assert after != before
-        assert after == all_of(history)
-
-    def test_a_server_without_its_rows_gets_all_of_them(self, history, database, postgres):
-        """As where it was made anew, or another one is named."""
-        fill(history)
-        with sending(history, database) as sender:
-            wait_until_sent(sender)
+        sent(history, database)
+        change(history, "UPDATE mark SET value = 'another' WHERE name = 'sent_to'")
         other = HistoryServer(postgres.url(postgres.database()))
-        history.add(success(START + 50))
-        with sending(history, other) as sender:
-            wait_until_sent(sender)
-        assert all_of(History(other)) == all_of(history)
+        for number, server in enumerate((database, other)):
+            history.add(success(START + 50 + number))
+            assert all_of(sent(history, server)) == all_of(history)
 
     def test_a_full_disk_of_the_server(self, history, database, postgres):
         with sending(history, database) as sender:
@@ -310,12 +292,9 @@ def test_ten_writers(tmp_path, database):
     """Of ten machines, as it were, one valve among them twice: all arrive, once."""
     number = 60
     places = [f"{k}.sqlite={k % 9}" for k in range(10)]
-    subprocess.run(
-        [sys.executable, WRITER, tmp_path, database.url, str(number), *places],
-        stdout=subprocess.DEVNULL,
-        check=True,
-        timeout=300,
-    )
+    with writer("sent", tmp_path, database.url, number, *places) as process:
+        process.communicate(timeout=300)
+    assert process.returncode == 0
     server = History(database)
     assert len(server.valves()) == 9
     counts = {valve.name: len(server.entries([valve.name])) for valve in server.valves()}
@@ -381,7 +360,7 @@ class TestAnotherMachine:
                 "print(sender.state.is_sending); sender.end()\n"
             )
             done = subprocess.run(
-                [sys.executable, "-c", code, history.path, database.url, str(HERE.parents[1])],
+                [sys.executable, "-c", code, history.path, database.url, str(PROJECT)],
                 capture_output=True,
                 text=True,
                 check=True,
@@ -391,11 +370,6 @@ class TestAnotherMachine:
             assert sender_of(history.path, database) is sender
             sender.end()
             assert sender.state.is_sending
-
-
-@pytest.fixture
-def full(tmp_path):
-    return filled(tmp_path)
 
 
 @pytest.fixture(params=["file", "server"])
@@ -466,9 +440,7 @@ def test_a_row_that_was_changed_there_is_told(full, tmp_path):
     """What is kept is never changed; so a copy that differs is said to."""
     target = tmp_path / "copy.sqlite"
     copied(full.path, target)
-    with closing(sqlite3.connect(target)) as connection:
-        connection.execute("UPDATE parameter SET value = 1.0 WHERE value = 150.123456789")
-        connection.commit()
+    change(HistoryFile(target), "UPDATE parameter SET value = 1.0 WHERE value = 150.123456789")
     parts = {one.table: one for one in copied(full.path, target)}
     assert (parts["identification"].rows, parts["identification"].same) == (6, 4)
     assert [name for name, one in parts.items() if not one.is_same] == ["identification"]
@@ -481,28 +453,21 @@ def test_ends_that_cannot_be(full, tmp_path):
         copied(tmp_path / "none.sqlite", full.path)
 
 
-@pytest.mark.parametrize("version", [2, 6, 7])
+@pytest.mark.parametrize("version", [2, 5, 6, 7])
 def test_a_file_of_an_older_version_is_copied_and_stays_as_it_is(version, other, tmp_path):
-    path = tmp_path / "old.sqlite"
-    with closing(sqlite3.connect(path)) as connection:
-        connection.executescript((HERE / f"history_of_version_{version}.sql").read_text())
-    content = path.read_bytes()
-    old = all_of(HistoryFile(path))
-    assert is_same(copied(path, other))
-    assert all_of(History(other)) == old
-    assert [one.written for one in copied(path, other)] == [0] * 11
-    assert path.read_bytes() == content
-    HistoryFile(path).add(success(START + 99))  # which changes its tables, and not its keys
-    parts = copied(path, other)
+    if version == 5:
+        make_version_5(old := filled(tmp_path))
+    else:
+        old = make_version(version, HistoryFile(tmp_path / "old.sqlite"))
+    content, before = old.path.read_bytes(), all_of(old)
+    assert is_same(copied(old.path, other))
+    assert all_of(History(other)) == before
+    assert [one.written for one in copied(old.path, other)] == [0] * 11
+    assert old.path.read_bytes() == content
+    old.add(success(START + 99))  # which changes its tables, and not its keys
+    parts = copied(old.path, other)
     assert {one.table: one.written for one in parts if one.written} == {"identification": 1}
     assert is_same(parts)
-
-
-def test_a_file_of_version_5_is_copied(full, other):
-    make_version_5(full)
-    old = all_of(full)
-    assert is_same(copied(full.path, other))
-    assert all_of(History(other)) == old
 
 
 class KilledError(Exception):
@@ -513,22 +478,22 @@ def test_a_copy_that_ends_early_goes_on(full, other, monkeypatch):
     monkeypatch.setattr(copying, "_MANY", 7)
     for number in range(40):
         full.add(success(START + 100 + number))
+    write, count = copying.write_rows, [0]
 
-    def end(count):
-        if count >= 14:
+    def write_some(*arguments):
+        count[0] += 1
+        if count[0] > 2:
             raise KilledError
+        write(*arguments)
 
-    runs = 0
-    while True:
-        runs += 1
-        assert runs < 20
-        try:
-            parts = copied(full.path, other, tell=end)
-        except KilledError:
-            continue
-        break
-    assert runs > 3
-    assert is_same(parts)
+    monkeypatch.setattr(copying, "write_rows", write_some)
+    for _ in range(3):
+        count[0] = 0
+        with pytest.raises(KilledError):
+            copied(full.path, other)
+    monkeypatch.undo()
+    assert is_same(parts := copied(full.path, other))
+    assert 0 < parts[0].written < parts[0].rows
     assert all_of(History(other)) == all_of(full)
 
 
@@ -536,23 +501,17 @@ _TEXTS = st.text(st.characters(exclude_categories=["Cs"]), max_size=20)
 _NUMBERS = st.floats(allow_nan=True, allow_infinity=True)
 
 
+@pytest.fixture(scope="module")
+def any_database(postgres):
+    """One for all examples."""
+    return HistoryServer(postgres.url(postgres.database()))
+
+
 @settings(max_examples=25)
 @given(st.lists(st.tuples(_TEXTS, _NUMBERS, _NUMBERS), min_size=1, max_size=4))
-def test_any_value_arrives(postgres, tmp_path_factory, rows):
-    from valve_friction_ros.health import Measured
-    from valve_friction_ros.history import HistoryServer
-
+def test_any_value_arrives(any_database, tmp_path_factory, rows):
     file = HistoryFile(tmp_path_factory.mktemp("any") / "history.sqlite")
     for number, (text, value, width) in enumerate(rows):
-        is_number = not math.isnan(value + width)
-        kept = {"lag": Measured(value, width)} if is_number else {}
-        entry = success(START + number, warnings=(text,), numbers=kept)
-        file.add(entry)
-    server = HistoryServer(postgres.url(_any_database(postgres)))
-    assert is_same(copied(file.path, server))
-
-
-def _any_database(postgres, made={}):  # noqa: B006 - one for all examples
-    if postgres not in made:
-        made[postgres] = postgres.database()
-    return made[postgres]
+        kept = {} if math.isnan(value + width) else {"lag": Measured(value, width)}
+        file.add(success(START + number, warnings=(text,), numbers=kept))
+    assert is_same(copied(file.path, any_database))

@@ -9,20 +9,19 @@
 
 """A history on a PostgreSQL server: read as a file is, its tables, its address, its rights."""
 
-import datetime
-import ipaddress
 import os
 import re
-import sqlite3
 import subprocess
 import sys
-from contextlib import closing, contextmanager
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 import sqlalchemy as sa
 from full_history import all_of, fill, filled
-from histories import START, VALVE, success
+from histories import START, VALVE, make_version, select, success
+from local_server import certificate_pair
+from postgres import database_of, sending
 from waiting import wait_until
 
 from valve_friction_ros.history import (
@@ -34,7 +33,6 @@ from valve_friction_ros.history import (
     history_mark,
     keep_renewal,
     ratios_after,
-    sender_of,
     server_from,
     tables,
 )
@@ -51,41 +49,33 @@ def history(tmp_path):
     return filled(tmp_path)
 
 
-def test_it_is_read_as_the_file_is(history, database):
-    copied(history.path, database)
-    assert all_of(History(database)) == all_of(history)
-    mark = history_mark(History(database))
+@pytest.fixture
+def server(history, database):
+    """The same on a server."""
+    assert all(one.is_same for one in copied(history.path, database))
+    return History(database)
+
+
+def test_it_is_read_as_the_file_is(history, server):
+    assert all_of(server) == all_of(history)
+    mark = history_mark(server)
     assert mark[:4] == history_mark(history)[:4]
     assert mark.settled
     found, expected = (
-        sorted(one[1:] for one in ratios_after(each, 0, 0)) for each in (History(database), history)
+        sorted(one[1:] for one in ratios_after(each, 0, 0)) for each in (server, history)
     )
     assert len(found) == 2
     assert found == expected
 
 
-def test_the_view_for_plain_sql_is_the_same(history, database, postgres):
-    copied(history.path, database)
+def test_the_view_for_plain_sql_is_the_same(history, server, postgres):
     query = (
         "SELECT time, valve, tag, coulomb_friction, half_width, sliding_friction, ratio, message, "
         "refusal FROM friction"
     )
-    with closing(sqlite3.connect(history.path)) as file:
-        expected = sorted(file.execute(query), key=repr)
+    expected = sorted(select(history, query), key=repr)
     assert len(expected) == 6
-    assert sorted(postgres.do(database_of(database), query), key=repr) == expected
-
-
-def database_of(server):
-    return server.url.rpartition("/")[2].partition("?")[0]
-
-
-def written(dump, folder):
-    """Make a file of the SQL that a version has dumped."""
-    path = folder / dump.with_suffix(".sqlite").name
-    with closing(sqlite3.connect(path)) as connection:
-        connection.executescript(dump.read_text())
-    return path
+    assert sorted(postgres.do(database_of(server.place), query), key=repr) == expected
 
 
 def test_there_is_nothing_before_the_first_row(database):
@@ -104,18 +94,12 @@ def test_columns_of_both_engines_are_the_same(history, database, postgres):
         "SELECT table_name, column_name FROM information_schema.columns "
         "WHERE table_schema = 'public' ORDER BY table_name, ordinal_position",
     )
-    with closing(sqlite3.connect(history.path)) as file:
-        tables = sorted(
-            name
-            for (name,) in file.execute(
-                "SELECT name FROM sqlite_master WHERE type IN ('table', 'view')"
-            )
-        )
-        expected = [
-            (table, row[1])
-            for table in tables
-            for row in file.execute(f"PRAGMA table_info({table})")
-        ]
+    names = select(history, "SELECT name FROM sqlite_master WHERE type IN ('table', 'view')")
+    expected = [
+        (table, row[1])
+        for (table,) in sorted(names)
+        for row in select(history, f"PRAGMA table_info({table})")
+    ]
     assert found == expected
 
 
@@ -137,7 +121,7 @@ class TestVersions:
     def test_a_server_of_version_7_is_read_and_extended(self, tmp_path, database, postgres):
         """It holds what the file of that version holds."""
         postgres.do(database_of(database), VERSION_7.read_text())
-        file = HistoryFile(written(VERSION_7.with_name("history_of_version_7.sql"), tmp_path))
+        file = make_version(7, HistoryFile(tmp_path / "history.sqlite"))
         name = database_of(database)
         rights = "GRANT SELECT ON ALL TABLES IN SCHEMA public TO reader"
         postgres.do(name, f"CREATE ROLE reader LOGIN PASSWORD 'one'; {rights}")
@@ -154,34 +138,31 @@ class TestVersions:
         assert sum(one.written for one in copied(file.path, database)) == 1
         assert all_of(History(database)) == all_of(file)
 
-    def test_a_step_is_done_once_by_many(self, history, database, monkeypatch):
-        copied(history.path, database)
-        before = all_of(History(database))
+    def test_a_step_is_done_once_by_many(self, server, monkeypatch):
+        before = all_of(server)
         with_step(monkeypatch, "ALTER TABLE valve ADD COLUMN remark REAL")
         for _ in range(2):
-            with writing(database) as connection:
+            with writing(server.place) as connection:
                 found = connection.exec_driver_sql("SELECT remark FROM valve").all()
         assert len(found) == 2
-        assert all_of(History(database)) == before
+        assert all_of(server) == before
 
-    def test_a_step_that_fails_changes_nothing(self, history, database, monkeypatch):
-        copied(history.path, database)
-        before = all_of(History(database))
+    def test_a_step_that_fails_changes_nothing(self, server, monkeypatch):
+        before = all_of(server)
         with monkeypatch.context() as patch:
             with_step(patch, "DROP VIEW friction", "ALTER TABLE nowhere ADD COLUMN remark REAL")
-            with pytest.raises(HistoryError, match="nowhere"), writing(database):
+            with pytest.raises(HistoryError, match="nowhere"), writing(server.place):
                 pass
-        assert all_of(History(database)) == before
-        with writing(database) as connection:
+        assert all_of(server) == before
+        with writing(server.place) as connection:
             assert connection.exec_driver_sql("SELECT count(*) FROM friction").scalar() == 6
 
-    def test_a_newer_one_is_refused(self, history, database, postgres):
-        copied(history.path, database)
-        postgres.do(database_of(database), "UPDATE mark SET value = '99' WHERE name = 'schema'")
-        with pytest.raises(HistoryError, match="newer version of this package"):
-            History(database).valves()
-        with pytest.raises(HistoryError, match="newer version of this package"):
-            copied(history.path, database)
+    def test_a_newer_one_is_refused(self, history, server, postgres):
+        newer = "UPDATE mark SET value = '99' WHERE name = 'schema'"
+        postgres.do(database_of(server.place), newer)
+        for act in (server.valves, lambda: copied(history.path, server.place)):
+            with pytest.raises(HistoryError, match="newer version of this package"):
+                act()
 
 
 class TestTrouble:
@@ -190,10 +171,7 @@ class TestTrouble:
     @pytest.mark.parametrize(
         ("change", "words"),
         [
-            (
-                lambda url: url.replace("owner@", f"nobody:{SECRET}@"),
-                "password",
-            ),
+            (lambda url: url.replace("owner@", f"nobody:{SECRET}@"), "password"),
             (lambda url: re.sub(":[0-9]+/", ":1/", url), "check that the server runs"),
             (lambda url: url + "x", "make it, or name another database"),
             (lambda url: url + "?sslmode=require", "check sslmode"),
@@ -235,32 +213,30 @@ class TestTrouble:
         with pytest.raises(ValueError, match=f"{name}: no address"):
             server_from("", environment={name: "s3cret"})
 
-    def test_a_server_that_stands_still_is_left(self, history, database, postgres, monkeypatch):
-        copied(history.path, database)
+    def test_a_server_that_stands_still_is_left(self, history, server, postgres, monkeypatch):
         monkeypatch.setattr(connections, "_PATIENCE_WITH_SERVER", 1.0)
         late = pytest.raises(
             HistoryError, match="timeout: no answer for 1 s: check that the server"
         )
-        with late, writing(database) as connection, postgres.paused():
+        with late, writing(server.place) as connection, postgres.paused():
             connection.scalar(sa.select(1))
         with postgres.paused(), pytest.raises(HistoryError):
-            History(database).valves()
-        assert History(database).valves() == history.valves()
+            server.valves()
+        assert server.valves() == history.valves()
 
-    def test_a_connection_that_has_ended_is_made_anew(self, history, database, postgres):
-        copied(history.path, database)
-        assert History(database).valves() == history.valves()
+    def test_a_connection_that_has_ended_is_made_anew(self, history, server, postgres):
+        assert server.valves() == history.valves()
         postgres.stop()
         with pytest.raises(HistoryError):
-            History(database).valves()
+            server.valves()
         postgres.start()
-        assert History(database).valves() == history.valves()
+        assert server.valves() == history.valves()
 
-    def test_texts_of_any_kind_arrive(self, history, database):
+    def test_texts_of_any_kind_arrive(self, history, server):
         entry = success(START + 9, warnings=("a\0b '; DROP TABLE valve; -- %s ? 😀",))
         history.add(entry)
-        assert all(one.is_same for one in copied(history.path, database))
-        last = History(database).entries([VALVE.name])[-1]
+        assert all(one.is_same for one in copied(history.path, server.place))
+        last = server.entries([VALVE.name])[-1]
         assert last.warnings == ("a␀b '; DROP TABLE valve; -- %s ? 😀",)
 
 
@@ -287,7 +263,7 @@ def test_without_its_library_one_line_says_so(monkeypatch):
         History(HistoryServer("postgresql://h/d")).valves()
 
 
-PAGE = Path(__file__).resolve().parents[2] / "doc" / "how_to" / "history_server.md"
+PAGE = PROJECT / "doc" / "how_to" / "history_server.md"
 (ROLES,) = re.findall(r"```sql\n(.*?)```", PAGE.read_text(), re.DOTALL)
 
 
@@ -302,7 +278,7 @@ def one_valve(tmp_path):
 def roles(one_valve, database, postgres):
     """Addresses of the server for a node and a reader, with the rights of the page."""
     copied(one_valve.path, database)
-    name = database.url.rpartition("/")[2]
+    name = database_of(database)
     postgres.do(name, "DROP ROLE IF EXISTS valve_nodes; DROP ROLE IF EXISTS valve_readers;" + ROLES)
     yield {
         role: HistoryServer(postgres.url(name, role, password))
@@ -313,8 +289,7 @@ def roles(one_valve, database, postgres):
 
 
 def test_a_node_may_send_and_take(one_valve, roles, database, tmp_path):
-    sender = sender_of(one_valve.path, roles["valve_nodes"])
-    try:
+    with sending(one_valve, roles["valve_nodes"]) as sender:
         assert sender.take(VALVE) is None
         fill(one_valve)  # adds, changes and replaces
         keep_renewal(one_valve, VALVE, START + 10**9)  # deletes
@@ -323,15 +298,10 @@ def test_a_node_may_send_and_take(one_valve, roles, database, tmp_path):
             lambda: all_of(History(database)) == all_of(one_valve), lambda: sender.state, turn=0.1
         )
         assert sender.state.problem is None
-    finally:
-        sender.end()
     second = HistoryFile(tmp_path / "second.sqlite")
-    sender = sender_of(second.path, roles["valve_nodes"])
-    try:
+    with sending(second, roles["valve_nodes"]) as sender:
         assert sender.take(VALVE) is None
         assert len(second.entries()) == len(one_valve.entries())
-    finally:
-        sender.end()
 
 
 def test_a_reader_reads_and_writes_nothing(one_valve, roles):
@@ -369,7 +339,7 @@ def test_what_a_node_may_not(roles, statement):
 
 
 def test_who_may_make_no_tables_is_told_who_does(one_valve, database, postgres):
-    name = database.url.rpartition("/")[2]
+    name = database_of(database)
     postgres.do(name, "CREATE ROLE stranger LOGIN PASSWORD 'three'")
     try:
         with pytest.raises(HistoryError, match="have the owner of the database run"):
@@ -378,45 +348,10 @@ def test_who_may_make_no_tables_is_told_who_does(one_valve, database, postgres):
         postgres.do(name, "DROP ROLE stranger")
 
 
-def _certificate(folder, name):
-    """Write a key and a certificate for 127.0.0.1, signed by itself."""
-    from cryptography import x509
-    from cryptography.hazmat.primitives import hashes, serialization
-    from cryptography.hazmat.primitives.asymmetric import ec
-
-    key = ec.generate_private_key(ec.SECP256R1())
-    subject = x509.Name([x509.NameAttribute(x509.NameOID.COMMON_NAME, name)])
-    now = datetime.datetime.now(datetime.timezone.utc)
-    address = x509.SubjectAlternativeName([x509.IPAddress(ipaddress.ip_address("127.0.0.1"))])
-    certificate = (
-        x509.CertificateBuilder()
-        .subject_name(subject)
-        .issuer_name(subject)
-        .public_key(key.public_key())
-        .serial_number(x509.random_serial_number())
-        .not_valid_before(now - datetime.timedelta(days=1))
-        .not_valid_after(now + datetime.timedelta(days=1))
-        .add_extension(address, critical=False)
-        .add_extension(x509.BasicConstraints(ca=True, path_length=0), critical=True)
-        .sign(key, hashes.SHA256())
-    )
-    paths = folder / f"{name}.pem", folder / f"{name}.key"
-    paths[0].write_bytes(certificate.public_bytes(serialization.Encoding.PEM))
-    paths[1].write_bytes(
-        key.private_bytes(
-            serialization.Encoding.PEM,
-            serialization.PrivateFormat.PKCS8,
-            serialization.NoEncryption(),
-        )
-    )
-    return paths
-
-
 @contextmanager
 def encrypted(postgres, folder):
     """Have the server offer TLS, and nothing else."""
-    pytest.importorskip("cryptography", reason="run `make venv-test`")
-    certificate, key = _certificate(folder, "server")
+    certificate, key = certificate_pair(folder)
     owner = postgres.folder.stat()
     for path in (certificate, key):
         copy = postgres.folder / path.name
@@ -444,8 +379,11 @@ def encrypted(postgres, folder):
 
 def test_encryption_by_the_address(one_valve, database, postgres, tmp_path):
     with encrypted(postgres, tmp_path) as certificate:
-        stranger, _ = _certificate(tmp_path, "stranger")
-        checked = f"{database.url}?sslmode=verify-full&sslrootcert="
+        (tmp_path / "other").mkdir()
+        stranger, _ = certificate_pair(tmp_path / "other")
+        # The certificate is of that name, and the server listens on this address.
+        named = database.url.replace("@127.0.0.1:", "@localhost:") + "?hostaddr=127.0.0.1"
+        checked = f"{named}&sslmode=verify-full&sslrootcert="
         parts = copied(one_valve.path, HistoryServer(f"{checked}{certificate}"))
         assert all(one.is_same for one in parts)
         for url in (f"{checked}{stranger}", f"{database.url}?sslmode=disable"):

@@ -72,22 +72,18 @@ HISTORIES = {
 }
 
 
+@pytest.mark.parametrize("drift", [0.0, 2.0])
 @pytest.mark.parametrize("name", HISTORIES)
-def test_the_interval_covers_the_drift(name):
-    """At least as often as it says, by the chance of so many runs (1 in 1000)."""
+def test_the_interval_covers_the_drift(name, drift):
+    """At least as often as it says, by the chance of so many runs (1 in 1000).
+
+    So a stationary valve shows a drift in 5 % of the histories at most.
+    """
     rng = np.random.default_rng(20)
-    trends = [trend_of(points(2.0, rng=rng, **HISTORIES[name])) for _ in range(RUNS)]
-    covered = sum(abs(trend.drift - 2.0) <= trend.half_width for trend in trends)
+    trends = [trend_of(points(drift, rng=rng, **HISTORIES[name])) for _ in range(RUNS)]
+    covered = sum(abs(trend.drift - drift) <= trend.half_width for trend in trends)
     assert covered >= binom.ppf(0.001, RUNS, 0.95)
-
-
-@pytest.mark.parametrize("name", HISTORIES)
-def test_a_stationary_valve_shows_no_drift(name):
-    """In 5 % of the histories at most."""
-    rng = np.random.default_rng(21)
-    trends = [trend_of(points(0.0, rng=rng, **HISTORIES[name])) for _ in range(RUNS)]
-    shown = sum(trend.is_significant for trend in trends)
-    assert shown <= binom.ppf(0.999, RUNS, 0.05)
+    assert drift or covered == sum(not trend.is_significant for trend in trends)
 
 
 def test_five_exact_looking_estimates_that_scatter_give_no_confidence():
@@ -129,8 +125,6 @@ class TestDays:
         some = [DatedNumber(NOON + k * DAY // 20, 150.0 + k, 1.0) for k in range(49)]
         assert trend_of(some) is None
         assert trend_of([*some, some[-1]._replace(time=some[-1].time + DAY)]).days == 4
-
-    def test_nothing(self):
         assert trend_of([]) is None
 
 
@@ -205,14 +199,6 @@ class TestCrossing:
         trend = trend_of(points(0.1, scatter=20.0, rng=rng), Baseline(120.0))
         assert not trend.is_significant
         assert trend.crossing is None
-
-
-@pytest.mark.parametrize("half_width", [-1.0, math.nan, math.inf])
-def test_an_interval_that_cannot_be(half_width):
-    some = straight()
-    some[3] = some[3]._replace(half_width=half_width)
-    with pytest.raises(ValueError, match="half_width"):
-        trend_of(some)
 
 
 def test_against_a_baseline_of_sliding_friction_its_limits_count():
@@ -313,12 +299,6 @@ def test_the_crossing_is_where_line_and_level_are_as_far_apart_as_their_interval
 def test_no_crossing_without_a_slope():
     assert line_with(slope_error=2.3).crossing(150.0, 0.0) is None  # 2.3 · 2.228 > 5
     assert line_with(slope_error=2.2).crossing(150.0, 0.0) is not None
-
-
-@pytest.mark.parametrize("times", [TIMES[:3], np.zeros(5)], ids=["three", "one time"])
-def test_too_little(times):
-    with pytest.raises(ValueError, match="a line needs 4 estimates at several times"):
-        fit_line(times, np.ones(times.size), np.ones(times.size))
 
 
 PERIOD = 10_000_000

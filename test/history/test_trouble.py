@@ -18,7 +18,8 @@ import tempfile
 from pathlib import Path
 
 import pytest
-from histories import START, success
+from histories import START, change, select, success
+from writers import writer
 
 from valve_friction_ros.history import HistoryError, HistoryFile, database, tables
 from valve_friction_ros.history.place import Claim
@@ -34,13 +35,6 @@ def history(tmp_path):
     return history
 
 
-def change(history, statement):
-    connection = sqlite3.connect(history.path)
-    connection.execute(statement)
-    connection.commit()
-    connection.close()
-
-
 def told(history, action=lambda history: history.add(success(START + 1))):
     """Return the message of the error; it is one line that begins with the path."""
     with pytest.raises(HistoryError) as error:
@@ -52,10 +46,8 @@ def told(history, action=lambda history: history.add(success(START + 1))):
 
 
 def is_whole(history, count=1):
-    connection = sqlite3.connect(history.path)
-    (state,) = connection.execute("PRAGMA integrity_check").fetchone()
-    connection.close()
-    return state == "ok" and len(history.entries()) == count
+    state = select(history, "PRAGMA integrity_check")
+    return state == [("ok",)] and len(history.entries()) == count
 
 
 def fill(monkeypatch, pages):
@@ -104,18 +96,24 @@ history.add(success(START))
 """
 
 
-def test_a_file_that_may_not_grow(history):
-    """The operating system itself refuses to write."""
+def printed_by(program, path):
+    """Run a program, given a path and the folders of its modules; what it prints."""
     run = subprocess.run(
-        [sys.executable, "-c", LIMITED, str(history.path), *map(str, FOLDERS)],
+        [sys.executable, "-c", program, str(path), *map(str, FOLDERS)],
         capture_output=True,
         text=True,
         timeout=300,
         check=False,
     )
     assert run.returncode == 0, run.stderr
-    assert run.stdout.startswith(f"{history.path}: ")
-    assert run.stdout.endswith("check the disk, its free space and the process's limits\n")
+    return run.stdout
+
+
+def test_a_file_that_may_not_grow(history):
+    """The operating system itself refuses to write."""
+    told = printed_by(LIMITED, history.path)
+    assert told.startswith(f"{history.path}: ")
+    assert told.endswith("check the disk, its free space and the process's limits\n")
     assert is_whole(history, len(history.entries()))
     assert len(history.entries()) > 10
 
@@ -153,23 +151,12 @@ def test_read_only_folder():
         HistoryFile(folder / "history.sqlite").add(success())
         (folder / "history.sqlite").chmod(0o444)
         folder.chmod(0o555)
-        run = subprocess.run(
-            [sys.executable, "-c", READ_ONLY, name, *map(str, FOLDERS)],
-            capture_output=True,
-            text=True,
-            timeout=300,
-            check=False,
-        )
+        told = printed_by(READ_ONLY, folder)
         folder.chmod(0o755)
-    assert run.returncode == 0, run.stderr
-    count, old, new = run.stdout.splitlines()
+    count, old, new = told.splitlines()
     assert count == "1"
     assert "readonly database: make the file and its folder writable, or name another" in old
     assert "unable to open database file: check that the folder is there and writable" in new
-
-
-def test_a_folder_in_place_of_the_file(tmp_path):
-    assert "unable to open" in told(HistoryFile(tmp_path))
 
 
 def test_newer_schema(history):
@@ -217,12 +204,12 @@ def test_another_process_creates_it_while_it_is_looked_at(tmp_path, monkeypatch)
 def test_no_database(tmp_path):
     history = HistoryFile(tmp_path / "history.sqlite")
     history.path.write_bytes(b"nothing of the kind" * 100)
-    expected = (
-        "file is not a database: name the right file, or move this file away: the node then "
-        "begins a new file"
-    )
-    assert told(history) == expected
-    assert told(history, HistoryFile.entries) == expected
+    for action in (HistoryFile.prepare, HistoryFile.entries):
+        assert told(history, action) == (
+            "file is not a database: name the right file, or move this file away: the node then "
+            "begins a new file"
+        )
+    assert "unable to open" in told(HistoryFile(tmp_path))  # a folder
 
 
 def test_damaged_pages(history):
@@ -258,13 +245,6 @@ def test_held_by_another(history, monkeypatch):
     assert is_whole(history, 2)
 
 
-def test_a_row_that_holds_no_result(history):
-    change(history, "UPDATE parameter SET verdict = 'perhaps'")
-    assert "a row holds no result: 'perhaps' is not a valid Verdict" in told(
-        history, HistoryFile.entries
-    )
-
-
 @pytest.mark.parametrize("half_width", ["NULL", "-1.0", "9e999"])
 def test_a_row_that_somebody_has_spoilt_makes_no_trend(history, half_width):
     history.add(success(START + 1))
@@ -285,18 +265,13 @@ def test_nothing_of_a_failed_change_stays(history, monkeypatch):
     assert is_whole(history)
 
 
-WRITER = Path(__file__).with_name("history_writer.py")
 KILLED, LIVING = 4, 2
 ROWS = 25
 """What a living writer writes, and a killed one at least."""
 
 
 def start(path, number, rows=()):
-    return subprocess.Popen(
-        [sys.executable, str(WRITER), str(path), str(number), *map(str, rows)],
-        stdout=subprocess.PIPE,
-        text=True,
-    )
+    return writer("history", path, number, *rows)
 
 
 def finished_before_the_kill(process):
@@ -328,10 +303,8 @@ def test_no_finished_row_is_lost_and_nothing_is_corrupted(tmp_path):
             process.wait()
             process.stdout.close()
     assert finished[KILLED:] == [ROWS] * LIVING
-    connection = sqlite3.connect(history.path)
-    assert connection.execute("PRAGMA integrity_check").fetchall() == [("ok",)]
-    assert connection.execute("PRAGMA foreign_key_check").fetchall() == []
-    connection.close()
+    assert select(history, "PRAGMA integrity_check") == [("ok",)]
+    assert select(history, "PRAGMA foreign_key_check") == []
     for number, count in enumerate(finished):
         name = f"/fv_{number}/identifier"
         entries = history.entries([name])
@@ -348,7 +321,7 @@ HOLD = """
 import sys
 from pathlib import Path
 from valve_friction_ros.history.place import Claim
-claim = Claim(Path(sys.argv[1]), "/fv_101/identifier")
+claim = Claim(Path(sys.argv[1]), "/fv_101")
 print(claim.ask(), flush=True)
 sys.stdin.read()
 """
@@ -370,11 +343,9 @@ def test_one_claim_a_valve(tmp_path):
 
 def test_a_killed_process_has_none(tmp_path):
     path = tmp_path / "history.sqlite"
-    claim = Claim(path, "/fv_101/identifier")
-    command = [sys.executable, "-c", HOLD, str(path)]
-    with subprocess.Popen(
-        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-    ) as holder:
+    claim, command = Claim(path, "/fv_101"), [sys.executable, "-c", HOLD, str(path)]
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+    with subprocess.Popen(command, text=True, **pipes) as holder:
         assert holder.stdout.readline() == "True\n"
         assert not claim.ask()
         holder.kill()
@@ -383,6 +354,4 @@ def test_a_killed_process_has_none(tmp_path):
 
 
 def test_a_folder_that_is_not_there_grants_it(tmp_path):
-    claim = Claim(tmp_path / "nowhere" / "history.sqlite", "/fv_101")
-    assert claim.ask()
-    claim.release()
+    assert Claim(tmp_path / "nowhere" / "history.sqlite", "/fv_101").ask()

@@ -10,18 +10,16 @@
 """Moves, answers and usage of valves as rows of a history."""
 
 import math
-import sqlite3
-from contextlib import closing
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
 import full_history
 import pytest
-from histories import DAY, OTHER, SECOND, START, VALVE, make_version_5, success
-from test_file import write_version_2
+from full_history import BUILT, service_move
+from histories import DAY, OTHER, SECOND, START, VALVE, change, select, success
 
-from valve_friction_ros.evidence import FrictionChange, Move
+from valve_friction_ros.evidence import FrictionChange
 from valve_friction_ros.health import Level, Reference, SlidingFriction
 from valve_friction_ros.history import (
     AlarmRecording,
@@ -43,7 +41,6 @@ from valve_friction_ros.history import (
     read_told_level,
     read_usage,
     service_rows,
-    tables,
     valve_histories,
 )
 from valve_friction_ros.model import Valve
@@ -83,20 +80,6 @@ def test_they_are_bounded(history):
     assert len(read_answers(history, VALVE.name)) == 2099 - 2000 + 1 + 1
 
 
-def test_a_stamp_of_the_future_drops_none(history):
-    keep_answers(history, VALVE, TRAVEL, [answer(0)])
-    keep_answers(history, VALVE, TRAVEL, [answer(0, stamp=2**62)], days=3650.0)
-    assert len(read_answers(history, VALVE.name)) == 2
-
-
-def test_a_new_packing_answers_anew(history):
-    keep_answers(history, VALVE, TRAVEL, [answer(0)])
-    keep_answers(history, OTHER, TRAVEL, [answer(0)])
-    keep_renewal(history, VALVE, START)
-    assert read_answers(history, VALVE.name) == ()
-    assert read_answers(history, OTHER.name) == (answer(0),)
-
-
 def test_a_history_shows_those_of_its_time(history):
     history.add(success())
     keep_answers(history, VALVE, TRAVEL, [answer(-10, 0.5), answer(10, 0.75)])
@@ -108,39 +91,9 @@ def test_a_history_shows_those_of_its_time(history):
     assert told["largest_ignored"] == 0.0
 
 
-def test_an_older_file_and_one_without_the_table(tmp_path):
-    for name, make in (("old", make_version_5), ("without", _without_the_table)):
-        history = HistoryFile(tmp_path / f"{name}.sqlite")
-        history.prepare()
-        make(history)
-        assert read_answers(history, VALVE.name) == ()
-        keep_renewal(history, VALVE, START)
-        keep_answers(history, VALVE, TRAVEL, [answer(1)])
-        assert read_answers(history, VALVE.name) == (answer(1),)
-
-
-def _without_the_table(history):
-    with closing(sqlite3.connect(history.path)) as connection:
-        connection.execute("DROP TABLE answer")
-        connection.execute("PRAGMA user_version = 6")
-
-
-def test_a_row_that_holds_none_is_told(history):
-    keep_answers(history, VALVE, TRAVEL, [answer(1)])
-    with closing(sqlite3.connect(history.path)) as connection:
-        connection.execute("UPDATE answer SET dead_time = 'soon'")
-        connection.commit()
-    with pytest.raises(HistoryError, match="a row holds no"):
-        read_answers(history, VALVE.name)
-
-
-BUILT = Valve(diaphragm_area=0.0445, pressure_reference=41_740.0, travel=0.03)
-
-
 def move(number, start=START):
-    begin = start + 12 * SECOND * number
-    onset = (500.0, 1e-3, 20.0) if number % 2 else ()
-    return Move(begin, begin + SECOND, 1e-3, 2e-3, 500.0 + number, 10.0, 1e-3, *onset)
+    one = service_move(number)
+    return replace(one, begin=one.begin + start - START, end=one.end + start - START)
 
 
 def kept(history, built=BUILT, valve=VALVE):
@@ -187,78 +140,68 @@ def test_one_wrong_stamp_costs_no_kept_move(history, start):
     assert len(kept(history)) >= 41
 
 
-class TestReference:
-    FIRST, LATER = (Reference(SlidingFriction(one, 9.0, 1e-3), START) for one in (300.0, 450.0))
-
-    def kept(self, history, built=BUILT, valve=VALVE):
-        return read_reference(history, valve.name, built)
-
-    def test_the_first_stays(self, history):
-        for one in (self.FIRST, self.LATER):
-            keep_reference(history, VALVE, BUILT, one)
-        assert self.kept(history) == self.FIRST
-        assert self.kept(history, valve=OTHER) is None
-
-    def test_another_actuator_has_another(self, history):
-        larger = replace(BUILT, diaphragm_area=0.05)
-        keep_reference(history, VALVE, BUILT, self.FIRST)
-        assert self.kept(history, larger) is None
-        keep_reference(history, VALVE, larger, self.LATER)
-        assert self.kept(history, larger) == self.LATER
-        assert self.kept(history, replace(larger, travel=0.05)) == self.LATER
-
-    def test_a_renewal_begins_anew(self, history):
-        for valve in (VALVE, OTHER):
-            keep_moves(history, valve, BUILT, [move(0)])
-            keep_reference(history, valve, BUILT, self.FIRST)
-        keep_renewal(history, VALVE, START + DAY)
-        assert kept(history) == []
-        assert self.kept(history) is None
-        assert kept(history, valve=OTHER) == [500.0]
-        assert self.kept(history, valve=OTHER) == self.FIRST
-        keep_moves(history, VALVE, BUILT, [move(1)])
-        keep_reference(history, VALVE, BUILT, self.LATER)
-        assert kept(history) == [501.0]
-        assert self.kept(history) == self.LATER
-
-    def test_an_older_file_holds_none(self, history):
-        write_version_2(history)
-        assert self.kept(history) is None
+FIRST, LATER = (Reference(SlidingFriction(one, 9.0, 1e-3), START) for one in (300.0, 450.0))
 
 
-class TestChange:
-    FIRST, LATER = (
-        FrictionChange(START, START + DAY, one, 0.9 * one, 1.1 * one) for one in (1.3, 1.5)
-    )
+def test_the_first_reference_stays(history):
+    for one in (FIRST, LATER):
+        keep_reference(history, VALVE, BUILT, one)
+    assert read_reference(history, VALVE.name, BUILT) == FIRST
+    assert read_reference(history, OTHER.name, BUILT) is None
 
-    def kept(self, history, built=BUILT, valve=VALVE):
-        return read_change(history, valve.name, built)
 
-    def test_the_last_one_stays_until_the_packing_is_renewed(self, history):
-        for valve, change in ((VALVE, self.FIRST), (OTHER, self.FIRST), (VALVE, self.LATER)):
-            keep_change(history, valve, BUILT, change)
-        assert self.kept(history) == self.LATER
-        assert self.kept(history, replace(BUILT, diaphragm_area=0.05)) is None
-        keep_renewal(history, VALVE, START + DAY)
-        assert self.kept(history) is None
-        assert self.kept(history, valve=OTHER) == self.FIRST
+def test_another_actuator_has_another_reference(history):
+    larger = replace(BUILT, diaphragm_area=0.05)
+    keep_reference(history, VALVE, BUILT, FIRST)
+    assert read_reference(history, VALVE.name, larger) is None
+    keep_reference(history, VALVE, larger, LATER)
+    assert read_reference(history, VALVE.name, larger) == LATER
+    assert read_reference(history, VALVE.name, replace(larger, travel=0.05)) == LATER
 
-    def test_an_older_file_and_one_without_the_table(self, history):
-        write_version_2(history)
-        assert self.kept(history) is None
-        for change in (
-            lambda: keep_change(history, VALVE, BUILT, self.FIRST),
-            lambda: keep_renewal(history, VALVE, START),
-        ):
-            keep_change(history, VALVE, BUILT, self.LATER)
-            connection = sqlite3.connect(history.path)
-            with connection:
-                connection.execute("DROP TABLE evidence_change")
-                connection.execute("PRAGMA user_version = 6")  # the last that may lack it
-            connection.close()
-            assert self.kept(history) is None
-            change()
-        assert self.kept(history) is None
+
+GROWN, DOUBLED = (
+    FrictionChange(START, START + DAY, one, 0.9 * one, 1.1 * one) for one in (1.3, 2.0)
+)
+
+
+def test_the_last_change_stays(history):
+    for valve, one in ((VALVE, GROWN), (OTHER, GROWN), (VALVE, DOUBLED)):
+        keep_change(history, valve, BUILT, one)
+    assert read_change(history, VALVE.name, BUILT) == DOUBLED
+    assert read_change(history, OTHER.name, BUILT) == GROWN
+    assert read_change(history, VALVE.name, replace(BUILT, diaphragm_area=0.05)) is None
+
+
+def in_service(history, valve):
+    readers = (read_moves, read_reference, read_change)
+    found = [read(history, valve.name, BUILT) for read in readers]
+    return [*map(repr, found), repr(read_answers(history, valve.name))]
+
+
+def test_a_new_packing_begins_anew(history):
+    for valve in (VALVE, OTHER):
+        full_history.fill(history, valve)
+    before = in_service(history, OTHER)
+    keep_renewal(history, VALVE, START + DAY)
+    assert in_service(history, VALVE) == ["()", "None", "None", "()"]
+    assert in_service(history, OTHER) == before
+    keep_moves(history, VALVE, BUILT, [move(1)])
+    keep_reference(history, VALVE, BUILT, LATER)
+    assert kept(history) == [501.0]
+    assert read_reference(history, VALVE.name, BUILT) == LATER
+
+
+def test_a_table_that_a_file_of_version_6_lacks(history):
+    """A change of its development: some of its files have the table, some have not."""
+    history.prepare()
+    change(history, "DROP TABLE evidence_change; DROP TABLE answer; PRAGMA user_version = 6")
+    assert read_change(history, VALVE.name, BUILT) is None
+    assert read_answers(history, VALVE.name) == ()
+    keep_renewal(history, VALVE, START)
+    keep_change(history, VALVE, BUILT, GROWN)
+    keep_answers(history, VALVE, TRAVEL, [answer(1)])
+    assert read_change(history, VALVE.name, BUILT) == GROWN
+    assert read_answers(history, VALVE.name) == (answer(1),)
 
 
 @pytest.mark.parametrize("changes", [{"diaphragm_area": 0.05}, {"pressure_reference": 0.0}])
@@ -272,24 +215,6 @@ def test_a_machine_without_a_diaphragm(history):
     driven = Valve()
     keep_moves(history, VALVE, driven, [move(0)])
     assert kept(history, driven) == [500.0]
-
-
-def test_an_older_file_is_read_and_extended(history):
-    write_version_2(history)
-    assert read_moves(history, VALVE.name, BUILT) == ()
-    keep_moves(history, VALVE, BUILT, [move(0)])
-    assert kept(history) == [500.0]
-    assert history.valves()
-
-
-def test_a_row_that_holds_no_move(history):
-    keep_moves(history, VALVE, BUILT, [move(0)])
-    connection = sqlite3.connect(history.path)
-    with connection:
-        connection.execute("UPDATE move SET force = 'much'")
-    connection.close()
-    with pytest.raises(HistoryError, match="a row holds no"):
-        read_moves(history, VALVE.name, BUILT)
 
 
 TODAY = START // DAY
@@ -332,10 +257,7 @@ def test_a_renewal_parts_a_day(history):
 
 
 def rows(history):
-    connection = sqlite3.connect(history.path)
-    found = connection.execute("SELECT day, run FROM usage ORDER BY day, run").fetchall()
-    connection.close()
-    return found
+    return select(history, "SELECT day, run FROM usage ORDER BY day, run")
 
 
 def test_runs_of_finished_days_become_one(history):
@@ -372,9 +294,7 @@ def test_the_run_that_writes_keeps_its_days(history):
 def test_what_cannot_be_added_up_stays(history):
     for run in ("old", "older"):
         keep_usage(history, VALVE, run, [UsedDay(TODAY, 0, usage(1.0))])
-    connection = sqlite3.connect(history.path)
-    connection.executescript("UPDATE usage SET histogram_ns = '[1]' WHERE run = 'old'")
-    connection.close()
+    change(history, "UPDATE usage SET histogram_ns = '[1]' WHERE run = 'old'")
     keep_usage(history, VALVE, "run", [UsedDay(TODAY + 9, 0, usage(1.0))])
     assert rows(history) == [(TODAY, "old"), (TODAY, "older"), (TODAY + 9, "run")]
 
@@ -415,42 +335,19 @@ def test_old_alarm_recordings_are_forgotten(history):
     assert len(alarm_recordings(history, OTHER.name)) == 1
 
 
-def version(history):
-    connection = sqlite3.connect(history.path)
-    (number,) = connection.execute("PRAGMA user_version").fetchone()
-    connection.close()
-    return number
-
-
-def test_a_file_of_version_5_is_read_and_extended(history):
-    history.add(success())
-    make_version_5(history)
-    assert read_usage(history, VALVE.name).days == ()
-    assert alarm_recordings(history, VALVE.name) == ()
-    assert read_told_level(history, VALVE.name) is None
-    assert len(valve_histories(history, (VALVE,), 0, START + 1)) == 1
-    assert version(history) == 5
-    keep_usage(history, VALVE, "run", [UsedDay(TODAY, 0, usage(1.0))])
-    assert version(history) == tables.SCHEMA_VERSION
-    assert read_usage(history, VALVE.name).total == usage(1.0)
-    assert len(history.entries()) == 1
-
-
 @pytest.mark.parametrize(
-    ("change", "read"),
+    ("spoilt", "read"),
     [
         ("usage SET histogram_ns = '[1]'", read_usage),
         ("usage SET reversals = 'many'", read_usage),
         ("alarm_recording SET level = 7", alarm_recordings),
         ("told_level SET level = 7", read_told_level),
+        ("answer SET dead_time = 'soon'", read_answers),
+        ("move SET force = 'much'", partial(read_moves, built=BUILT)),
     ],
 )
-def test_rows_that_hold_nothing(history, change, read):
-    keep_usage(history, VALVE, "run", [UsedDay(TODAY, 0, usage(1.0))])
-    keep_alarm_recording(history, VALVE, AlarmRecording(START, Level.WARN, Path("/a"), "x"))
-    keep_told_level(history, VALVE, Level.WARN)
-    connection = sqlite3.connect(history.path)
-    connection.executescript(f"PRAGMA ignore_check_constraints = ON; UPDATE {change}")
-    connection.close()
+def test_rows_that_hold_nothing(history, spoilt, read):
+    full_history.fill(history)
+    change(history, f"UPDATE {spoilt}")
     with pytest.raises(HistoryError, match="a row holds no"):
         read(history, VALVE.name)

@@ -98,24 +98,28 @@ def filled(folder):
 
 def all_of(history):
     """Everything that is read of a history, as text: nan is not itself."""
-    found = [history.valves(), history.entries()]
-    for valve in (VALVE, OTHER):
-        name = valve.name
-        found += [
-            history.baseline(name),
-            history.baselines(name),
-            history.last_success(name) if history.entries([name]) else None,
-            history.known_numbers(name, BENCH_VALVE, 0),
-            history.points(name, "bench"),
-            kept.read_usage(history, name),
-            kept.alarm_recordings(history, name),
-            kept.read_told_level(history, name),
-            kept.read_alarms(history, name),
-            kept.alarm_events(history, AlarmFilter(valve=name)),
-            kept.read_moves(history, name, BUILT),
-            kept.read_reference(history, name, BUILT),
-            kept.read_change(history, name, BUILT),
-            kept.read_answers(history, name),
-            kept.valve_histories(history, [valve], 0, 2**62),
-        ]
+    found = [repr(history.valves()), repr(history.entries())]
+    return [*found, *all_of_valve(history, VALVE), *all_of_valve(history, OTHER)]
+
+
+def all_of_valve(history, valve):
+    """Everything that is read of one valve, as text."""
+    name = valve.name
+    found = (
+        history.baseline(name),
+        history.baselines(name),
+        history.last_success(name) if history.entries([name]) else None,
+        history.known_numbers(name, BENCH_VALVE, 0),
+        history.points(name, "bench"),
+        kept.read_usage(history, name),
+        kept.alarm_recordings(history, name),
+        kept.read_told_level(history, name),
+        kept.read_alarms(history, name),
+        kept.alarm_events(history, AlarmFilter(valve=name)),
+        kept.read_moves(history, name, BUILT),
+        kept.read_reference(history, name, BUILT),
+        kept.read_change(history, name, BUILT),
+        kept.read_answers(history, name),
+        kept.valve_histories(history, [valve], 0, 2**62),
+    )
     return [repr(one) for one in found]

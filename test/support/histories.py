@@ -13,6 +13,7 @@ import math
 import sqlite3
 from contextlib import closing
 from dataclasses import replace
+from pathlib import Path
 
 from valve_friction_ros.health import (
     Diagnosis,
@@ -123,15 +124,32 @@ _OF_VERSION_5 = {
 }
 
 
+def select(history, query):
+    """The rows that plain SQL finds in the file."""
+    with closing(sqlite3.connect(history.path)) as connection:
+        return connection.execute(query).fetchall()
+
+
+def change(history, script):
+    """Change the file by plain SQL, whatever its checks say."""
+    with closing(sqlite3.connect(history.path)) as connection:
+        connection.executescript(f"PRAGMA ignore_check_constraints = ON; {script}")
+
+
+def make_version(version, history):
+    """Fill a new file with what that version has dumped of its own."""
+    history.path.parent.mkdir(parents=True, exist_ok=True)
+    dumped = Path(__file__).parents[1] / "history" / f"history_of_version_{version}.sql"
+    change(history, dumped.read_text())
+    return history
+
+
 def make_version_5(history):
     """Take away what later versions know: the valve in service, other files, typed states."""
-    with closing(sqlite3.connect(history.path)) as connection:
-        for column in state_columns(Diagnosis(Level.OK, StatusSignal.GOOD, quoted(""), None)):
-            connection.execute(f"ALTER TABLE identification DROP COLUMN {column}")
-        for table in ("identification", "baseline"):
-            connection.execute(f"DROP INDEX {table}_uid")
-            connection.execute(f"ALTER TABLE {table} DROP COLUMN uid")
-        tables = connection.execute("SELECT name FROM sqlite_master WHERE type = 'table'")
-        newer = {name for (name,) in tables} - _OF_VERSION_5
-        connection.executescript("".join(f"DROP TABLE {name};" for name in newer))
-        connection.execute("PRAGMA user_version = 5")
+    columns = state_columns(Diagnosis(Level.OK, StatusSignal.GOOD, quoted(""), None))
+    script = [f"ALTER TABLE identification DROP COLUMN {column}" for column in columns]
+    for table in ("identification", "baseline"):
+        script += [f"DROP INDEX {table}_uid", f"ALTER TABLE {table} DROP COLUMN uid"]
+    tables = select(history, "SELECT name FROM sqlite_master WHERE type = 'table'")
+    script += [f"DROP TABLE {name}" for (name,) in tables if name not in _OF_VERSION_5]
+    change(history, f"{'; '.join(script)}; PRAGMA user_version = 5")

@@ -9,6 +9,8 @@
 
 """A PostgreSQL server for tests."""
 
+import contextlib
+
 import pytest
 
 from benchmark.harness.postgres import PostgresServer, why_no_server
@@ -27,6 +29,23 @@ def postgres():
     server = PostgresServer()
     yield server
     server.remove()
+
+
+def database_of(server):
+    """Name of the database of an address."""
+    return server.url.rpartition("/")[2].partition("?")[0]
+
+
+@contextlib.contextmanager
+def sending(file, server):
+    """Send the rows of a history to a server, as a node does."""
+    from valve_friction_ros.history import sender_of
+
+    sender = sender_of(file.path, server)
+    try:
+        yield sender
+    finally:
+        sender.end()
 
 
 @pytest.fixture

@@ -30,7 +30,6 @@ from valve_friction_ros.commands.arguments.identification import (
 from valve_friction_ros.commands.arguments.recording import described, reading_options
 from valve_friction_ros.commands.console import OutputConsole
 from valve_friction_ros.commands.process import ExitCode, StopSignals, complain
-from valve_friction_ros.fleet.cluster import cluster_at, in_cluster
 from valve_friction_ros.fleet.job import (
     FILING,
     Filing,
@@ -42,14 +41,15 @@ from valve_friction_ros.fleet.job import (
     identify_job,
     identify_job_elsewhere,
 )
-from valve_friction_ros.fleet.plant import read_plant, valves_of, with_parts_joined
-from valve_friction_ros.fleet.processes import DeadWorker, in_processes, usable_cores
 from valve_friction_ros.fleet.recordings import (
     Baselines,
     Findings,
     FoundRecording,
     find_recordings,
     read_baselines,
+    read_plant,
+    valves_of,
+    with_parts_joined,
 )
 from valve_friction_ros.fleet.results_file import (
     REFUSED,
@@ -69,6 +69,13 @@ from valve_friction_ros.fleet.rows import (
     ranked,
     reaches,
     with_reports_written,
+)
+from valve_friction_ros.fleet.workers import (
+    DeadWorker,
+    cluster_at,
+    in_cluster,
+    in_processes,
+    usable_cores,
 )
 from valve_friction_ros.health import Level
 from valve_friction_ros.history import HistoryError
@@ -361,7 +368,7 @@ def _baselines(options: argparse.Namespace, names: Sequence[str]) -> Baselines:
     if options.baselines is None:
         return Baselines({})
     baselines = read_baselines(options.baselines)
-    count = baselines.count(names)
+    count = sum(bool(baselines.of(name)) for name in names)
     if count == 0:
         raise ValueError(
             f"{options.baselines}: no recording of {options.folder} has a baseline in it: its "

@@ -216,9 +216,7 @@ class HistoryCache:
         """
         if self.file is None:
             return ()
-        if is_journal:
-            return database.alarm_events(self.file, chosen, most)
-        return database.standing_alarms(self.file, chosen, most)
+        return database.alarm_events(self.file, chosen, most, is_standing=not is_journal)
 
     @property
     def is_file(self) -> bool:

@@ -14,32 +14,30 @@ from typing import TYPE_CHECKING
 from valve_friction_ros.on_demand import names_on_demand
 
 if TYPE_CHECKING:
-    from valve_friction_ros.fleet.cluster import (
-        Cluster as Cluster,
-        cluster_at as cluster_at,
-        in_cluster as in_cluster,
-    )
     from valve_friction_ros.fleet.job import (
         Job as Job,
         Options as Options,
         identify_job as identify_job,
         identify_job_elsewhere as identify_job_elsewhere,
     )
-    from valve_friction_ros.fleet.plant import read_plant as read_plant
-    from valve_friction_ros.fleet.processes import (
-        DeadWorker as DeadWorker,
-        in_processes as in_processes,
-        usable_cores as usable_cores,
-    )
     from valve_friction_ros.fleet.recordings import (
         Baselines as Baselines,
         Findings as Findings,
         find_recordings as find_recordings,
         read_baselines as read_baselines,
+        read_plant as read_plant,
     )
     from valve_friction_ros.fleet.results_file import (
         RecordingRows as RecordingRows,
         ResultsFile as ResultsFile,
+    )
+    from valve_friction_ros.fleet.workers import (
+        Cluster as Cluster,
+        DeadWorker as DeadWorker,
+        cluster_at as cluster_at,
+        in_cluster as in_cluster,
+        in_processes as in_processes,
+        usable_cores as usable_cores,
     )
 else:
     __getattr__ = names_on_demand(__name__)

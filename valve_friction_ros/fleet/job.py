@@ -17,7 +17,7 @@ import socket
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from valve_friction_ros import __version__
 from valve_friction_ros.fleet.rows import (
@@ -77,18 +77,11 @@ def kept_valve(tag: str) -> KeptValve:
 
 @dataclass(frozen=True, eq=False)
 class Filing:
-    """A result to be filed.
+    """A result to be filed, under the tag of its valve.
 
-    Attributes
-    ----------
-    recording, tag : str
-        The recording, and the tag of its valve.
-    span : Span
-        First and last time of the record, ns.
-    settings : MonitorSettings
-        How it was identified, and the limits of its diagnosis.
-    outcome : Result or RefusedRecordError
-        The result, without its pictures; or the refusal of a test in which the stem did not move.
+    `span` is from the first to the last time of the record, ns. The `settings` hold the limits of
+    the diagnosis. The `outcome` is the result, without its pictures, or the refusal of a test in
+    which the stem did not move.
     """
 
     recording: str
@@ -123,26 +116,11 @@ class Filing:
         span = Span(begin, begin + nanoseconds(recording.duration))
         return cls(name, tag, span, settings, outcome)
 
-    @property
-    def numbers(self) -> Mapping[str, Measured]:
-        """What the recording shows of the valve beside the parameters."""
-        if isinstance(self.outcome, RefusedRecordError):
-            return self.outcome.numbers
-        return valve_numbers(self.outcome)
 
+class Filed(NamedTuple):
+    """Outcome of filing: numbers of results filed now and before, and tags that got a baseline.
 
-@dataclass(frozen=True)
-class Filed:
-    """Outcome of filing.
-
-    Attributes
-    ----------
-    filed, known : int
-        Number of results filed now, and of results filed before.
-    baselines : tuple of str
-        Tags whose first result became the baseline.
-    cells : mapping of tuple of str to mapping of str to Cell
-        Cells of the diagnosis against the baseline in force, by recording and tag.
+    The cells are those of the diagnosis against the baseline in force, by recording and tag.
     """
 
     filed: int
@@ -247,10 +225,12 @@ def file_results(place: Path, filings: Iterable[Filing], first_is_baseline: bool
             begun += [one.tag] if in_force[one.tag] is not None else []
         baseline = in_force[one.tag]
         diagnosis, findings = diagnose_outcome(one.outcome, baseline, one.settings)
-        is_refused = isinstance(one.outcome, RefusedRecordError)
-        cells[one.recording, one.tag] = (
-            _held_cells(diagnosis) if is_refused else diagnosis_cells(diagnosis, findings)
-        )
+        numbers: Mapping[str, Measured] = {}
+        if isinstance(one.outcome, RefusedRecordError):
+            cells[one.recording, one.tag] = _held_cells(diagnosis)
+        else:
+            cells[one.recording, one.tag] = diagnosis_cells(diagnosis, findings)
+            numbers = valve_numbers(one.outcome)
         if (one.tag, one.span.begin // 10**9) in before:
             known += 1
             continue
@@ -264,7 +244,7 @@ def file_results(place: Path, filings: Iterable[Filing], first_is_baseline: bool
                 limits=one.settings.limits,
                 baseline=baseline,
                 settings=settings_text(one.settings),
-                **kept_of(one.outcome, one.numbers),
+                **kept_of(one.outcome, numbers),
             )
         )
         alarms[one.tag].follow(diagnosis, findings, one)

@@ -7,30 +7,41 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Recordings in a folder tree, and the baselines of their valves."""
+"""Recordings in a folder tree, the table of the valves of their plant, and their baselines."""
 
 import csv
 import hashlib
 import math
 import re
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any
+
+import yaml
 
 from valve_friction_ros.health import Baseline, Measured, SlidingFriction
 from valve_friction_ros.health.valve_numbers import COMPARED, IDENTIFIED_ONLY, fit_numbers
 from valve_friction_ros.identification import Verdict
 from valve_friction_ros.identification.settings import column_suffix
-from valve_friction_ros.outside_text import as_read
+from valve_friction_ros.outside_text import as_read, nearest, resembling
+from valve_friction_ros.records.bags.topics import is_bag
+from valve_friction_ros.records.columns import Columns
 from valve_friction_ros.records.files import (
     cause_of,
     explained,
+    on_disk,
     state_of,
     table_stem,
     unpacked_name,
     walk,
 )
+from valve_friction_ros.records.header_words import named
+from valve_friction_ros.records.table import OpenTable
+from valve_friction_ros.records.table_rows import encoding_of
+from valve_friction_ros.records.valve_description import QUESTIONS, valve_description
+from valve_friction_ros.records.valve_file import ValveFile, valve_file_of
 
 _METADATA = "metadata.yaml"
 _BAG_KEY = b"rosbag2_bagfile_information"
@@ -121,15 +132,6 @@ def _is_bag_folder(folder: Path, files: list[str]) -> bool:
         return False
 
 
-def _can_be_written(name: str) -> bool:
-    """Return whether a name can be written on one line of UTF-8."""
-    try:
-        name.encode()
-    except UnicodeEncodeError:
-        return False
-    return name.isprintable()
-
-
 def find_recordings(folder: Path, *left_out: Path) -> Findings:
     """Find the recordings in a folder and its subfolders, on this machine or in a store.
 
@@ -167,11 +169,229 @@ def _findings(folder: Path, own: set[Path]) -> Findings:
             else:
                 recordings.append(path)
     found = [FoundRecording(path, path.relative_to(folder).as_posix()) for path in recordings]
-    strange = [one for one in found if not _can_be_written(one.name)]
+    strange = [one for one in found if not one.name.isprintable()]  # on one line of UTF-8
     skipped += [one.name for one in strange]
     good = sorted((one for one in found if one not in strange), key=lambda one: one.name)
     return Findings(tuple(good), tuple(sorted(skipped)))
 
+
+# The valves of a plant
+
+_NUMBERS = {name: name for name in ("area", "travel", "opposing_area", "mass")}
+_NUMBERS |= {"spring": "spring_range", "range": "sensor_range"}
+"""Columns of numbers with units, and their names in `QUESTIONS`."""
+_WORDS = ("tag", "air_to", "sensor")
+_READ = {question.name: question.read for question in QUESTIONS}
+_HEADER = re.compile(r"\s*([\w ]+?)\s*(?:[\[(](.+)[\])])?\s*")
+_MOST_FAULTS = 6
+_MOST_SIGNALS = 3
+"""Most single-signal files in one record of a valve: pressure, position, set point."""
+
+
+_KNOWN = [*_WORDS, *_NUMBERS, *(each.name for each in fields(Columns))]
+
+
+def _row(cells: Mapping[str, tuple[str, str]]) -> str:
+    """Return the valve file of a row; each cell comes with the unit of its column."""
+    values: dict[str, Any] = {}
+    columns: dict[str, Any] = {}
+    for name, (cell, unit) in cells.items():
+        text = f"{cell} {unit}" if unit else cell
+        try:
+            if name in _NUMBERS:
+                values[_NUMBERS[name]] = _READ[_NUMBERS[name]](text)
+            elif name not in _WORDS:
+                columns[name] = yaml.safe_load(cell) if cell.lower() in ("true", "false") else cell
+        except ValueError as error:
+            raise ValueError(f"{name}: {error}") from None
+    tag = cells["tag"][0]
+    if missing := [name for name in ("area", "travel") if name not in values]:
+        raise ValueError(f"{tag}: {' and '.join(missing)} missing")
+    sensor, air_to = (cells.get(name, ("", ""))[0].casefold() for name in ("sensor", "air_to"))
+    words = {
+        "tag": tag,
+        "sensor": "absolute" if sensor.startswith("abs") else "gauge",
+        "air_to": "close" if air_to == "close" else "open",
+        "acting": "double" if "opposing_area" in values else "single",
+        "position": "plug",
+    }
+    return valve_description({**values, **words}, columns)
+
+
+def _table(path: Path) -> tuple[list[tuple[str, str]], list[list[str]]]:
+    """Return columns with units, and rows of a table; refuse misspelled columns."""
+    try:
+        content = path.read_bytes()
+        text = content.decode(encoding_of(content))
+        dialect = csv.Sniffer().sniff(text[:10_000], ",;\t")
+        header, *rows = [row for row in csv.reader(text.splitlines(), dialect) if any(row)]
+    except (OSError, UnicodeError, csv.Error, ValueError) as error:
+        raise ValueError(f"{path}: cannot be read as a table: {cause_of(error)}") from None
+    heads = []
+    for cell in header:
+        found = _HEADER.fullmatch(cell)
+        name = found[1].casefold().replace(" ", "_") if found else cell
+        if name not in _KNOWN and (close := resembling(name, _KNOWN)):
+            raise ValueError(f"{path}: unknown column {cell[:60]!r}: {nearest(name, close)}")
+        heads.append((name, (found[2] or "") if found else ""))
+    if "tag" not in dict(heads):
+        raise ValueError(f"{path}: there is no column tag: give tag, area, travel, spring, range")
+    return heads, rows
+
+
+def read_plant(path: Path) -> dict[str, ValveFile]:
+    """Read the valves of a plant from a CSV file: tag, area, travel, spring, range.
+
+    A number has its unit in its cell or in its header, as in ``travel [mm]``. Further columns are
+    ``air_to``, ``sensor`` (gauge or absolute), ``opposing_area``, ``mass``, and the keys of the
+    section ``columns:`` of a valve file, such as ``pressure_unit``. Other columns of a valve list
+    are ignored.
+
+    Returns
+    -------
+    dict of str to ValveFile
+        The valves by tag.
+
+    Raises
+    ------
+    ValueError
+        If the table cannot be read; the message names the file and all faulty rows.
+    """
+    heads, rows = _table(path)
+    valves: dict[str, ValveFile] = {}
+    faults = []
+    for number, row in enumerate(rows, start=2):
+        cells = {
+            name: (cell.strip(), unit)
+            for (name, unit), cell in zip(heads, row, strict=False)
+            if cell.strip() and name in _KNOWN
+        }
+        try:
+            if "tag" not in cells:
+                raise ValueError("it has no tag")
+            text, tag = _row(cells), cells["tag"][0]
+            if tag in valves:
+                raise ValueError(f"a second {tag}")
+            valves[tag] = valve_file_of(yaml.safe_load(text), path)
+        except ValueError as error:
+            faults.append(f"row {number}: {str(error).removeprefix(f'{path}: ')}")
+    if faults:
+        more = f"; and {len(faults) - _MOST_FAULTS} more" if len(faults) > _MOST_FAULTS else ""
+        raise ValueError(f"{path}: {'; '.join(faults[:_MOST_FAULTS])}{more}")
+    if not valves:
+        raise ValueError(f"{path}: there are no valves in it")
+    return valves
+
+
+def _pattern(tag: str) -> re.Pattern[str]:
+    parts = re.findall(r"[^\W\d_]+|\d+", tag)
+    return re.compile(
+        r"(?<![^\W_])" + r"[\W_]*".join(map(re.escape, parts)) + r"(?!\d)", re.IGNORECASE
+    )
+
+
+def tags_in(texts: Iterable[str], tags: Iterable[str]) -> list[str]:
+    """Return the tags found in texts, with any separators between letters and digits.
+
+    A tag that is only the beginning of another tag in the text, as FV-10 in FV-10A, is not found.
+    """
+    whole = "\n".join(texts)
+    found: list[str] = []
+    for tag in sorted(tags, key=len, reverse=True):
+        pattern = _pattern(tag)
+        if pattern.search(whole):
+            found.append(tag)
+            whole = pattern.sub("\n", whole)
+    return found
+
+
+def _tags_named(texts: Iterable[str], plant: Mapping[str, ValveFile]) -> list[str]:
+    """Return the tags of the valves named in texts, by their own tags or those of their signals."""
+    texts = list(texts)
+    if found := tags_in(texts, plant):
+        return found
+    names: dict[str, list[str]] = {}
+    for tag, valve in plant.items():
+        form = valve.columns
+        for name in (form.pressure_column, form.position_column, form.force_column):
+            names.setdefault(name, []).append(tag)
+    own = {name: tags[0] for name, tags in names.items() if name and len(tags) == 1}
+    return [*dict.fromkeys(own[name] for name in tags_in(texts, own))]
+
+
+def _tag_of(name: str, plant: Mapping[str, ValveFile]) -> str:
+    """Return the tag named in the path of a recording; empty if it names none or several."""
+    named = (_tags_named([text], plant) for text in reversed(Path(name).parts))
+    return next((found[0] for found in named if len(found) == 1), "")
+
+
+def _is_part(found: FoundRecording, valve: ValveFile) -> bool:
+    """Return whether a table holds only one signal, too few to identify a valve."""
+    try:
+        with on_disk(found.path) as path:
+            if is_bag(path) or OpenTable(path, valve.columns).layout.valves:
+                return False
+            layout = OpenTable(path, valve.columns, is_part=True).layout
+    except (ValueError, OSError):
+        return False  # reading it later gives the cause
+    signals = {one.name for group in layout.valves.values() for one in group}
+    return len(signals | {*layout.unclear}) == 1
+
+
+def with_parts_joined(
+    recordings: Sequence[FoundRecording], plant: Mapping[str, ValveFile]
+) -> Iterator[FoundRecording]:
+    """Yield the recordings, with the single-signal files of a valve in a folder joined to one.
+
+    If a folder holds several records of a valve, files belong together if their names differ only
+    in the words for the signals, as in ``FV101.PT 2026Q1.csv`` and ``FV101.ZT 2026Q1.csv``.
+    """
+    alike: dict[tuple[Path, str], list[FoundRecording]] = {}
+    for found in recordings:
+        if tag := _tag_of(found.name, plant):
+            alike.setdefault((found.path.parent, tag), []).append(found)
+    joined: dict[FoundRecording, FoundRecording | None] = {}
+    for (_, tag), files in alike.items():
+        parts = [one for one in files if len(files) > 1 and _is_part(one, plant[tag])]
+        groups: dict[str, list[FoundRecording]] = {}
+        for one in parts:
+            label = named([one.stem]).label if len(parts) > _MOST_SIGNALS else ""
+            groups.setdefault(label, []).append(one)
+        for first, *others in groups.values():
+            joined |= dict.fromkeys(others)
+            name = " + ".join([first.name, *(one.path.name for one in others)])
+            joined[first] = replace(first, name=name, beside=tuple(one.path for one in others))
+    whole = (joined.get(found, found) for found in recordings)
+    yield from (found for found in whole if found is not None)
+
+
+def valves_of(
+    path: Path, name: str, plant: Mapping[str, ValveFile], is_table: bool
+) -> Sequence[tuple[str, str, ValveFile]]:
+    """Find the valves of a recording by its name, else by its content.
+
+    Returns for each valve its label in the file (empty for a single valve), its tag, and the valve.
+
+    Raises ValueError if no tag is found, or if several are found and the file does not assign the
+    signals to them.
+    """
+    if tag := _tag_of(name, plant):
+        return [("", tag, plant[tag])]
+    if is_table:
+        layout = OpenTable(path, Columns()).layout
+        labels = [label for label in layout.valves if label]
+        by_label = [(label, _tags_named([label], plant)) for label in labels]
+        if by_label and all(len(tags) == 1 for _, tags in by_label):
+            return [(label, tag, plant[tag]) for label, (tag,) in by_label]
+        found = _tags_named([*layout.headers, *layout.texts], plant)
+        if len(found) == 1:
+            return [("", found[0], plant[found[0]])]
+        if found:
+            raise ValueError(f"it names several valves ({', '.join(found)}): put one into its name")
+    raise ValueError("no tag of the plant is in its name or above its values: rename it")
+
+
+# Baselines
 
 _COULOMB, _SLIDING, _SPEED = "coulomb_friction", "sliding_friction", "sliding_speed_m_per_s"
 
@@ -189,10 +409,6 @@ class Baselines:
         """Return the baselines of a recording, by the names of its valves."""
         everywhere = self.by_recording.get("", {})
         return {**everywhere, **self.by_recording.get(recording, {})}
-
-    def count(self, recordings: Iterable[str]) -> int:
-        """Count the recordings that have a baseline."""
-        return sum(bool(self.of(recording)) for recording in recordings)
 
 
 def _number(row: Mapping[str, str | None], column: str) -> float:

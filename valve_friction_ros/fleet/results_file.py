@@ -177,14 +177,10 @@ def reason_of(error: str) -> str:
 
 
 class Tally(NamedTuple):
-    """Counts of valves, with the reasons of refusals.
+    """Numbers of valves by the verdict on their Coulomb friction, or `REFUSED`.
 
-    Attributes
-    ----------
-    outcomes : Counter of str
-        Number of valves by the verdict on their Coulomb friction, or `REFUSED`.
-    reasons : mapping of str to sequence of str
-        Recordings of the refused valves by reason (`reason_of`), the most frequent reason first.
+    The `reasons` (`reason_of`) come with the recordings of the refused valves, the most frequent
+    reason first.
     """
 
     outcomes: Counter[str]

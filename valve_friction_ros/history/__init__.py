@@ -22,12 +22,10 @@ if TYPE_CHECKING:
         alarm_events as alarm_events,
         alarm_feed as alarm_feed,
         alarms_as_csv as alarms_as_csv,
-        area_of as area_of,
         follow_alarms as follow_alarms,
         read_alarms as read_alarms,
         request_alarms as request_alarms,
         request_many as request_many,
-        standing_alarms as standing_alarms,
     )
     from valve_friction_ros.history.copying import (
         CopiedPart as CopiedPart,

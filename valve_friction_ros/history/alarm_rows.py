@@ -14,8 +14,6 @@ therefore never make a step twice, and a killed process makes a step completely 
 functions raise HistoryError if the history cannot be read or written.
 """
 
-import csv
-import io
 import math
 import threading
 import uuid
@@ -46,15 +44,14 @@ from valve_friction_ros.health.levels import Level, StatusSignal
 from valve_friction_ros.history import tables
 from valve_friction_ros.history.database import reading, writing
 from valve_friction_ros.history.entry import KeptValve
-from valve_friction_ros.history.history import History, HistoryFile
+from valve_friction_ros.history.history import END_OF_TIME, History, HistoryFile
 from valve_friction_ros.history.place import file_state
 from valve_friction_ros.history.rows import oldest_kept, valve_id
 from valve_friction_ros.history.tables import joined, put
-from valve_friction_ros.outside_text import harmless
+from valve_friction_ros.outside_text import csv_text
 from valve_friction_ros.streams import utc
 
 _EVENT = tables.alarm_event
-_END_OF_TIME = 2**63 - 1
 
 
 class KeptAlarmEvent(NamedTuple):
@@ -65,16 +62,11 @@ class KeptAlarmEvent(NamedTuple):
 
     @property
     def area(self) -> str:
-        """Area of the valve."""
-        return area_of(self.valve.name)
+        """Area of the valve: the parent of its namespace.
 
-
-def area_of(name: str) -> str:
-    """Return the area of a valve from its identifier name: the parent of its namespace.
-
-    ``/unit_3/fv_101/identifier`` is in the area ``/unit_3``, ``/fv_101/identifier`` in ``/``.
-    """
-    return name.rsplit("/", 2)[0] or "/"
+        ``/unit_3/fv_101/identifier`` is in the area ``/unit_3``, ``/fv_101/identifier`` in ``/``.
+        """
+        return self.valve.name.rsplit("/", 2)[0] or "/"
 
 
 # Steps
@@ -327,15 +319,16 @@ class AlarmFilter:
         Words that must all occur in tag, name, message, person or text.
     """
 
-    since: int = -_END_OF_TIME
-    until: int = _END_OF_TIME
+    since: int = -END_OF_TIME
+    until: int = END_OF_TIME
     area: str = "/"
     valve: str = ""
     states: frozenset[AlarmState] = frozenset()
     kinds: frozenset[AlarmKind] = frozenset()
     words: str = ""
 
-    def _conditions(self) -> Iterable[Any]:
+    def conditions(self) -> Iterable[Any]:
+        """Yield the conditions for the rows of events joined with their valves."""
         name = tables.valve.c.name
         yield _EVENT.c.time_ns >= self.since
         yield _EVENT.c.time_ns < self.until
@@ -349,41 +342,38 @@ class AlarmFilter:
             yield _EVENT.c.kind.in_([one.value for one in self.kinds])
         searched = (tables.valve.c.tag, name, _EVENT.c.message, _EVENT.c.who, _EVENT.c.text)
         for word in self.words.split():
-            yield sa.or_(*(one.icontains(word, autoescape=True) for one in searched))
+            escaped = word.replace("/", "//").replace("%", "/%").replace("_", "/_")
+            pattern = sa.func.lower(f"%{escaped}%")
+            yield sa.or_(*(sa.func.lower(one).like(pattern, escape="/") for one in searched))
 
 
-def _listed(
-    history: History, chosen: AlarmFilter, most: int, *more: Any
+def alarm_events(
+    history: History,
+    chosen: AlarmFilter | None = None,
+    most: int = 100_000,
+    *,
+    is_standing: bool = False,
 ) -> tuple[KeptAlarmEvent, ...]:
+    """Return at most `most` alarm events, newest first.
+
+    With `is_standing`, only the last event of each alarm is returned, unless the alarm is normal.
+    """
     # Columns are named as in the events; only name and tag come from the valve.
     query = (
         sa.select(_EVENT, tables.valve.c.name.label("valve_name"), tables.valve.c.tag)
         .select_from(joined(_EVENT, tables.valve))
-        .where(*chosen._conditions(), *more)  # noqa: SLF001 - of this module
+        .where(*(chosen or AlarmFilter()).conditions())
         .order_by(_EVENT.c.time_ns.desc(), _EVENT.c.id.desc())
         .limit(most)
     )
+    if is_standing:
+        is_normal = _EVENT.c.state == AlarmState.NORMAL.name
+        query = query.where(_EVENT.c.id.in_(_newest()), sa.not_(is_normal))
     with reading(history.place) as connection:
         rows = connection.execute(query).mappings()
         return tuple(
             KeptAlarmEvent(KeptValve(row["valve_name"], row["tag"]), _event(row)) for row in rows
         )
-
-
-def alarm_events(
-    history: History, chosen: AlarmFilter | None = None, most: int = 100_000
-) -> tuple[KeptAlarmEvent, ...]:
-    """Return at most `most` alarm events, newest first."""
-    return _listed(history, chosen or AlarmFilter(), most)
-
-
-def standing_alarms(
-    history: History, chosen: AlarmFilter | None = None, most: int = 100_000
-) -> tuple[KeptAlarmEvent, ...]:
-    """Return the last event of each alarm that is not normal, newest first."""
-    is_last = _EVENT.c.id.in_(_newest())
-    is_normal = _EVENT.c.state == AlarmState.NORMAL.name
-    return _listed(history, chosen or AlarmFilter(), most, is_last, sa.not_(is_normal))
 
 
 _CSV: dict[str, Callable[[KeptAlarmEvent], object]] = {
@@ -407,12 +397,8 @@ _CSV: dict[str, Callable[[KeptAlarmEvent], object]] = {
 
 def alarms_as_csv(events: Iterable[KeptAlarmEvent]) -> str:
     """Return events as CSV, one line per event, with times in ISO 8601 (UTC)."""
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(_CSV)
-    for one in events:
-        writer.writerow(harmless(cell(one)) for cell in _CSV.values())
-    return out.getvalue()
+    rows = ({name: cell(one) for name, cell in _CSV.items()} for one in events)
+    return csv_text([*_CSV], rows)
 
 
 def _iso(time: int | None) -> str:

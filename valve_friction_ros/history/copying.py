@@ -13,8 +13,7 @@ import contextlib
 import hashlib
 import tempfile
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -35,87 +34,57 @@ _OWN = frozenset({"id", "valve_id", "settings_id"})
 """Columns with numbers that are valid within one history only."""
 
 Key = tuple[Any, ...]
-"""Values of the key columns of a part."""
-
-
-@dataclass(frozen=True)
-class Part:
-    """A table with rows per valve.
-
-    Attributes
-    ----------
-    table : Table
-        The table.
-    is_kept : bool
-        Whether a row never changes once written, so that it is never sent again.
-    children : tuple of Table
-        Tables whose rows belong to a row of this table, and are written with it.
-    """
-
-    table: sa.Table
-    is_kept: bool = False
-    children: tuple[sa.Table, ...] = ()
-
-    @property
-    def name(self) -> str:
-        """Name of the table."""
-        return self.table.name
-
-    @property
-    def key(self) -> tuple[str, ...]:
-        """Columns that distinguish the rows of one valve, the same in each history."""
-        return key_of(self.table)[1:]
-
-    @property
-    def order(self) -> list[sa.Column[Any]]:
-        """Columns that sort its rows in the order of storage, or else by key."""
-        names = ("id",) if "id" in self.table.c else key_of(self.table)
-        return [self.table.c[name] for name in names]
-
-    @property
-    def owner(self) -> str:
-        """Column by which the children refer to their row."""
-        return f"{self.name}_id"
-
-    def among(self, keys: Iterable[tuple[int, Key]]) -> Any:
-        """Return the condition for rows with given keys, each with the row of its valve."""
-        columns = [self.table.c[name] for name in key_of(self.table)]
-        return sa.tuple_(*columns).in_([(valve, *key) for valve, key in keys])
-
+"""Values that distinguish the rows of one valve in a table, the same in each history."""
 
 PARTS = (
-    Part(tables.identification, True, (tables.parameter, tables.identification_number)),
-    Part(tables.baseline, True, (tables.baseline_number, tables.baseline_record)),
-    Part(tables.packing_renewal, True),
-    Part(tables.usage),
-    Part(tables.alarm_recording),
-    Part(tables.told_level),
-    Part(tables.alarm_event, True),
-    Part(tables.move),
-    Part(tables.evidence_reference),
-    Part(tables.evidence_change),
-    Part(tables.answer),
+    tables.identification,
+    tables.baseline,
+    tables.packing_renewal,
+    tables.usage,
+    tables.alarm_recording,
+    tables.told_level,
+    tables.alarm_event,
+    tables.move,
+    tables.evidence_reference,
+    tables.evidence_change,
+    tables.answer,
 )
-"""All parts, in the order of copying."""
+"""The tables with rows per valve, in the order of copying."""
+
+_CHILDREN = {
+    tables.identification: (tables.parameter, tables.identification_number),
+    tables.baseline: (tables.baseline_number, tables.baseline_record),
+}
+"""Tables whose rows belong to a row of another table, and are written with it."""
+
+KEPT = frozenset(
+    {tables.identification, tables.baseline, tables.packing_renewal, tables.alarm_event}
+)
+"""Tables whose rows never change once written, so that they are never sent again."""
 
 
-@dataclass(frozen=True)
-class CopiedRow:
-    """A row of a part, with its children.
+def key_columns(part: sa.Table) -> list[sa.Column[Any]]:
+    """Return the columns of the `Key` of a part."""
+    return [part.c[name] for name in key_of(part)[1:]]
 
-    Attributes
-    ----------
-    key : tuple
-        Key of the row among the rows of its valve.
-    values : mapping of str to object
-        Its columns, including the text of the settings.
-    children : mapping of str to sequence of mapping
-        Columns of the rows that belong to it, by table.
-    """
+
+def storage_order(part: sa.Table) -> list[sa.Column[Any]]:
+    """Return the columns that sort the rows of a part in the order of storage, or else by key."""
+    return [part.c[name] for name in (("id",) if "id" in part.c else key_of(part))]
+
+
+def among(part: sa.Table, keys: Iterable[tuple[int, Key]]) -> Any:
+    """Return the condition for rows with given keys, each with the row of its valve."""
+    columns = [part.c[name] for name in key_of(part)]
+    return sa.tuple_(*columns).in_([(valve, *key) for valve, key in keys])
+
+
+class CopiedRow(NamedTuple):
+    """A row of a part: key, columns with the text of the settings, and children by table."""
 
     key: Key
     values: Mapping[str, Any]
-    children: Mapping[str, Sequence[Mapping[str, Any]]] = field(default_factory=dict)
+    children: Mapping[str, Sequence[Mapping[str, Any]]]
 
     @property
     def checksum(self) -> bytes:
@@ -134,40 +103,43 @@ def _plain(values: Mapping[str, Any]) -> list[tuple[str, Any]]:
     return sorted((name, without_nul(one)) for name, one in values.items())
 
 
-def rows_of(connection: Connection, part: Part, chosen: Any) -> Iterator[tuple[int, CopiedRow]]:
+def rows_of(connection: Connection, part: sa.Table, chosen: Any) -> Iterator[tuple[int, CopiedRow]]:
     """Read the rows of a part that meet a condition, in the order of storage.
 
     Each comes with the row of its valve.
     """
-    query = sa.select(part.table).where(chosen).order_by(*part.order)
-    if "settings_id" in part.table.c:
+    query = sa.select(part).where(chosen).order_by(*storage_order(part))
+    if "settings_id" in part.c:
         content = tables.settings.c.content.label("settings")
-        query = query.add_columns(content).select_from(joined(part.table, tables.settings))
+        query = query.add_columns(content).select_from(joined(part, tables.settings))
+    names = [column.name for column in key_columns(part)]
     for rows in connection.execute(query).mappings().partitions(_MANY):
         children = _children(connection, part, rows)
         for row in rows:
-            key = tuple(row[name] for name in part.key)
             values = {name: one for name, one in row.items() if name not in _OWN}
-            of_row = children[row["id"]] if part.children else {}
-            yield row["valve_id"], CopiedRow(key, values, of_row)
+            of_row = children[row["id"]] if part in _CHILDREN else {}
+            yield row["valve_id"], CopiedRow(tuple(row[name] for name in names), values, of_row)
 
 
 def _children(
-    connection: Connection, part: Part, rows: Sequence[RowMapping]
+    connection: Connection, part: sa.Table, rows: Sequence[RowMapping]
 ) -> dict[int, dict[str, list[dict[str, Any]]]]:
     """Return the children of rows, by row and table."""
+    some, owner = _CHILDREN.get(part, ()), f"{part.name}_id"
     found: defaultdict[int, dict[str, list[dict[str, Any]]]] = defaultdict(
-        lambda: {table.name: [] for table in part.children}
+        lambda: {table.name: [] for table in some}
     )
-    for table in part.children:
-        of_rows = table.c[part.owner].in_([row["id"] for row in rows])
+    for table in some:
+        of_rows = table.c[owner].in_([row["id"] for row in rows])
         for row in connection.execute(sa.select(table).where(of_rows)).mappings():
             values = dict(row)
-            found[values.pop(part.owner)][table.name].append(values)
+            found[values.pop(owner)][table.name].append(values)
     return found
 
 
-def write_rows(connection: Connection, part: Part, rows: Sequence[tuple[int, CopiedRow]]) -> None:
+def write_rows(
+    connection: Connection, part: sa.Table, rows: Sequence[tuple[int, CopiedRow]]
+) -> None:
     """Write rows, each with its valve's row in this history; writing them twice changes nothing.
 
     An existing row is replaced, except in a part that is kept.
@@ -182,18 +154,18 @@ def write_rows(connection: Connection, part: Part, rows: Sequence[tuple[int, Cop
         if "settings" in values:
             values["settings_id"] = settings[values.pop("settings")]
         written.append(values)
-    put(connection, part.table, written, is_kept=part.is_kept)
-    if not part.children:
+    put(connection, part, written, is_kept=part in KEPT)
+    if part not in _CHILDREN:
         return
-    table, (name,) = part.table, part.key
-    query = sa.select(table.c.id, table.c.valve_id, table.c[name]).where(
-        table.c.valve_id.in_({valve for valve, _ in rows}),
-        table.c[name].in_([row.key[0] for _, row in rows]),
+    (key,) = key_columns(part)
+    query = sa.select(part.c.id, part.c.valve_id, key).where(
+        part.c.valve_id.in_({valve for valve, _ in rows}),
+        key.in_([row.key[0] for _, row in rows]),
     )
     ids = {(valve, key): number for number, valve, key in connection.execute(query)}
-    for child in part.children:
+    for child in _CHILDREN[part]:
         of_rows = [
-            {part.owner: ids[valve, row.key[0]], **values}
+            {f"{part.name}_id": ids[valve, row.key[0]], **values}
             for valve, row in rows
             for values in row.children[child.name]
         ]
@@ -248,10 +220,7 @@ def _source(place: Place) -> Iterator[Place]:
 
 
 def copied(
-    source: Place,
-    target: Place,
-    valves: Sequence[str] | None = None,
-    tell: Callable[[int], object] = lambda _: None,
+    source: Place, target: Place, valves: Sequence[str] | None = None
 ) -> tuple[CopiedPart, ...]:
     """Copy all or some valves of a history to another history, and compare the two.
 
@@ -264,8 +233,6 @@ def copied(
         The two histories.
     valves : sequence of str, optional
         Names of identifiers.
-    tell : callable, optional
-        Called with the number of rows written so far.
 
     Returns
     -------
@@ -287,57 +254,50 @@ def copied(
         )
         with writing(target) as new:
             pairs = [(here, valve_id(new, one)) for one, here in wanted]
-        job = _Job(old, target, tell)
-        return tuple(job.copy(part, pairs) for part in PARTS)
+        return tuple(_copied(old, target, part, pairs) for part in PARTS)
 
 
-def _total(sums: Sequence[bytes]) -> str:
+def _copied(
+    old: Connection, target: Place, part: sa.Table, pairs: Sequence[tuple[int, int]]
+) -> CopiedPart:
+    """Copy the rows of valves, each given by its row in either history."""
+    before, sums = _sums(target, part, pairs), dict[tuple[int, Key], bytes]()
+    written, waiting = 0, list[tuple[int, CopiedRow]]()
+
+    def write() -> None:
+        nonlocal written
+        with writing(target) as new:
+            write_rows(new, part, waiting)
+        written += len(waiting)
+        waiting.clear()
+
+    for here, there in pairs:
+        for _, row in rows_of(old, part, part.c.valve_id == here):
+            sums[there, row.key] = row.checksum
+            if before.get((there, row.key)) != row.checksum:
+                waiting.append((there, row))
+            if len(waiting) >= _MANY:
+                write()
+    if waiting:
+        write()
+    after = _sums(target, part, pairs) if written else before
+    found = {key: after[key] for key in sums if key in after}
+    same = sum(found.get(key) == one for key, one in sums.items())
+    checksums = (_total(sums.values()), _total(found.values()))
+    return CopiedPart(part.name, len(sums), written, same, *checksums)
+
+
+def _sums(
+    place: Place, part: sa.Table, pairs: Sequence[tuple[int, int]]
+) -> dict[tuple[int, Key], bytes]:
+    """Return the checksums of the rows in the target of a copy, by valve and key."""
+    with reading(place) as new:
+        return {
+            (there, row.key): row.checksum
+            for _, there in pairs
+            for _, row in rows_of(new, part, part.c.valve_id == there)
+        }
+
+
+def _total(sums: Iterable[bytes]) -> str:
     return hashlib.sha256(b"".join(sorted(sums))).hexdigest()
-
-
-class _Job:
-    """Copies one part after another."""
-
-    def __init__(self, old: Connection, target: Place, tell: Callable[[int], object]) -> None:
-        self._old, self._target, self._tell = old, target, tell
-        self._written = 0
-
-    def copy(self, part: Part, pairs: Sequence[tuple[int, int]]) -> CopiedPart:
-        """Copy the rows of valves, each given by its row in either history."""
-        before, sums = self._sums(part, pairs), dict[tuple[int, Key], bytes]()
-        begun, waiting = self._written, list[tuple[int, CopiedRow]]()
-        for here, there in pairs:
-            for _, row in rows_of(self._old, part, part.table.c.valve_id == here):
-                sums[there, row.key] = row.checksum
-                if before.get((there, row.key)) != row.checksum:
-                    waiting.append((there, row))
-                if len(waiting) >= _MANY:
-                    self._write(part, waiting)
-        self._write(part, waiting)
-        after = self._sums(part, pairs) if self._written > begun else before
-        found = {key: after[key] for key in sums if key in after}
-        return CopiedPart(
-            part.name,
-            len(sums),
-            self._written - begun,
-            sum(found.get(key) == one for key, one in sums.items()),
-            _total([*sums.values()]),
-            _total([*found.values()]),
-        )
-
-    def _sums(self, part: Part, pairs: Sequence[tuple[int, int]]) -> dict[tuple[int, Key], bytes]:
-        """Return the checksums of the target's rows, by valve and key."""
-        with reading(self._target) as new:
-            return {
-                (there, row.key): row.checksum
-                for _, there in pairs
-                for _, row in rows_of(new, part, part.table.c.valve_id == there)
-            }
-
-    def _write(self, part: Part, waiting: list[tuple[int, CopiedRow]]) -> None:
-        if waiting:
-            with writing(self._target) as new:
-                write_rows(new, part, waiting)
-            self._written += len(waiting)
-            self._tell(self._written)
-            waiting.clear()

@@ -328,7 +328,7 @@ def _version_on_server(connection: Connection, server: HistoryServer) -> int:
     """Return the version of the tables, 0 without tables; refuse tables of a newer version."""
     if connection.scalar(sa.select(sa.func.to_regclass(mark.name))) is None:
         return 0
-    version = int(connection.scalar(_marked("schema")) or 0)
+    version = int(marked(connection, "schema") or 0)
     if version > SCHEMA_VERSION:
         raise HistoryError(
             f"{server}: its tables are of a newer version of this package (schema {version}, this "
@@ -337,13 +337,9 @@ def _version_on_server(connection: Connection, server: HistoryServer) -> int:
     return version
 
 
-def _marked(name: str) -> Any:
-    return sa.select(mark.c.value).where(mark.c.name == name)
-
-
 def marked(connection: Connection, name: str) -> str | None:
     """Return the mark of a database under a name, or None."""
-    found = connection.scalar(_marked(name))
+    found = connection.scalar(sa.select(mark.c.value).where(mark.c.name == name))
     return None if found is None else str(found)
 
 

@@ -41,19 +41,17 @@ from valve_friction_ros.history.rows import (
     record_in,
     valve_id,
 )
-from valve_friction_ros.history.tables import joined
+from valve_friction_ros.history.tables import joined, of_valve
 from valve_friction_ros.identification import FORMER_METHODS, SLIDING
 from valve_friction_ros.model.valve import Valve
 
-_END_OF_TIME = 2**63 - 1
+END_OF_TIME = 2**63 - 1
 """Largest integer in both databases."""
 
 
-def _of_valve(table: sa.Table, valve: str, since: int, until: int = _END_OF_TIME) -> Any:
+def _dated(table: sa.Table, valve: str, since: int, until: int = END_OF_TIME) -> Any:
     """Return a query for the rows of a valve from `since` to before `until`, ns."""
-    time = table.c.time_ns
-    chosen = (tables.valve.c.name == valve, time >= since, time < until)
-    return sa.select(table).select_from(joined(table, tables.valve)).where(*chosen)
+    return of_valve(table, valve).where(table.c.time_ns >= since, table.c.time_ns < until)
 
 
 @dataclass(frozen=True)
@@ -70,12 +68,12 @@ class History:
 
     place: Place
 
-    def baseline(self, valve: str, until: int = _END_OF_TIME) -> KeptBaseline | None:
+    def baseline(self, valve: str, until: int = END_OF_TIME) -> KeptBaseline | None:
         """Return the newest baseline set before `until` (ns) for the valve of this name, if any.
 
         None if the newest baseline was withdrawn.
         """
-        query = _of_valve(tables.baseline, valve, -_END_OF_TIME, until)
+        query = _dated(tables.baseline, valve, -END_OF_TIME, until)
         newest = query.order_by(tables.baseline.c.id.desc()).limit(1)
         with reading(self.place) as connection:
             row = connection.execute(newest).mappings().first()
@@ -87,17 +85,17 @@ class History:
             return replace(kept, baseline=whole, record=record_in(connection, number))
 
     def baselines(
-        self, valve: str, since: int = -_END_OF_TIME, until: int = _END_OF_TIME
+        self, valve: str, since: int = -END_OF_TIME, until: int = END_OF_TIME
     ) -> tuple[KeptBaseline, ...]:
         """Return each change of a valve's baseline, oldest first, without records."""
-        query = _of_valve(tables.baseline, valve, since, until).order_by(tables.baseline.c.id)
+        query = _dated(tables.baseline, valve, since, until).order_by(tables.baseline.c.id)
         with reading(self.place) as connection:
             return tuple(map(kept_baseline_in, connection.execute(query).mappings()))
 
     def last_success(self, valve: str) -> HistoryEntry | None:
         """Return the last successful identification of a valve, if any."""
         table = tables.identification
-        successes = _of_valve(table, valve, -_END_OF_TIME).where(table.c.refusal.is_(None))
+        successes = of_valve(table, valve).where(table.c.refusal.is_(None))
         with reading(self.place) as connection:
             row = connection.execute(successes.order_by(table.c.id.desc()).limit(1)).first()
             if row is None:
@@ -151,8 +149,8 @@ class History:
     def entries(
         self,
         valves: Sequence[str] | None = None,
-        since: int = -_END_OF_TIME,
-        until: int = _END_OF_TIME,
+        since: int = -END_OF_TIME,
+        until: int = END_OF_TIME,
     ) -> tuple[HistoryEntry, ...]:
         """Return the identifications of these valves, or of all, oldest first.
 

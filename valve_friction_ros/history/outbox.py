@@ -20,7 +20,7 @@ import socket
 import threading
 import time
 import uuid
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,7 +30,17 @@ import sqlalchemy as sa
 from sqlalchemy.engine import Connection
 
 from valve_friction_ros.history import tables
-from valve_friction_ros.history.copying import PARTS, CopiedRow, Key, Part, rows_of, write_rows
+from valve_friction_ros.history.copying import (
+    KEPT,
+    PARTS,
+    CopiedRow,
+    Key,
+    among,
+    key_columns,
+    rows_of,
+    storage_order,
+    write_rows,
+)
 from valve_friction_ros.history.database import (
     marked,
     reading,
@@ -49,8 +59,8 @@ from valve_friction_ros.history.place import (
 from valve_friction_ros.history.rows import valve_id
 from valve_friction_ros.history.tables import FILE_METADATA, has_table, put, unsent
 
-_VALVE = "valve"
-"""The part for a row of the valve table itself, whose tag may have changed."""
+_FOLLOWED = (tables.valve, *PARTS)
+"""Tables whose changes are queued; a row of the valve table itself may get another tag."""
 
 _NOW = "CAST(strftime('%s', 'now') AS INTEGER)"
 
@@ -59,12 +69,13 @@ _MANY = 500
 
 
 class Unsent(NamedTuple):
-    """A waiting row: its number in the queue, and its valve, part and key."""
+    """A waiting row: number in the queue, valve, table, key, and present state (None: deleted)."""
 
     number: int
-    valve: int
+    valve: KeptValve
     part: str
     key: Key
+    row: CopiedRow | None
 
 
 class UnsentCount(NamedTuple):
@@ -80,55 +91,50 @@ _NONE_WAIT = UnsentCount(0, None, 0)
 # The queue in a file
 
 
-def _triggers() -> list[str]:
-    """Return the statements that create the triggers, which queue each change of a row."""
-    found = [_trigger(_VALVE, (), event, "NEW", "id") for event in ("INSERT", "UPDATE")]
-    events = (("INSERT", "NEW"), ("UPDATE", "NEW"), ("DELETE", "OLD"))
-    for part in PARTS:
-        chosen = events[:1] if part.is_kept else events
-        found += [_trigger(part.name, part.key, *event) for event in chosen]
-    return found
+def _owner(table: sa.Table) -> sa.Column[Any]:
+    """Return the column with the row of the valve."""
+    return table.c.id if table is tables.valve else table.c.valve_id
 
 
-def _trigger(table: str, key: Sequence[str], event: str, row: str, valve: str = "valve_id") -> str:
-    keys = f"json_array({', '.join(f'{row}.{name}' for name in key)})"
-    same = f"valve_id = {row}.{valve} AND part = '{table}' AND key = {keys}"
+def _triggers() -> Iterator[str]:
+    """Yield the statements that create the triggers, which queue each change of a row."""
+    for table in _FOLLOWED:
+        yield _trigger(table, "INSERT", "NEW")
+        if table not in KEPT:
+            yield _trigger(table, "UPDATE", "NEW")
+        if table not in KEPT and table is not tables.valve:
+            yield _trigger(table, "DELETE", "OLD")
+
+
+def _trigger(table: sa.Table, event: str, row: str) -> str:
+    valve = f"{row}.{_owner(table).name}"
+    keys = f"json_array({', '.join(f'{row}.{one.name}' for one in key_columns(table))})"
+    same = f"valve_id = {valve} AND part = '{table.name}' AND key = {keys}"
     return (
-        f"CREATE TRIGGER IF NOT EXISTS unsent_{table}_{event.lower()} "  # noqa: S608
-        f"AFTER {event} ON {table} BEGIN "
+        f"CREATE TRIGGER IF NOT EXISTS unsent_{table.name}_{event.lower()} "  # noqa: S608
+        f"AFTER {event} ON {table.name} BEGIN "
         "INSERT INTO unsent (valve_id, part, key, since) "
-        f"SELECT {row}.{valve}, '{table}', {keys}, "
+        f"SELECT {valve}, '{table.name}', {keys}, "
         f"coalesce((SELECT min(since) FROM unsent WHERE {same}), {_NOW}); "
         f"DELETE FROM unsent WHERE {same} AND number < (SELECT max(number) FROM unsent); END"
     )
 
 
-def _fill(file: Connection) -> None:
-    """Queue all rows."""
-    file.execute(sa.delete(unsent))
-    _have_wait(file, tables.valve.c.id, _VALVE, ())
-    for part in PARTS:
-        _fill_part(file, part)
-
-
-def _fill_part(file: Connection, part: Part) -> None:
-    key = [part.table.c[name] for name in part.key]
-    _have_wait(file, part.table.c.valve_id, part.name, key, part.order)
-
-
-def _have_wait(
-    file: Connection, owner: Any, part: str, key: Sequence[Any], order: Sequence[Any] = ()
-) -> None:
+def _queue(file: Connection, some: Iterable[sa.Table]) -> None:
+    """Queue all rows of some tables."""
     now: Any = sa.literal_column(_NOW)
-    rows = sa.select(owner, sa.literal(part), sa.func.json_array(*key), now).order_by(*order)
-    file.execute(unsent.insert().from_select(("valve_id", "part", "key", "since"), rows))
+    for table in some:
+        key = sa.func.json_array(*key_columns(table))
+        rows = sa.select(_owner(table), sa.literal(table.name), key, now)
+        rows = rows.order_by(*storage_order(table))
+        file.execute(unsent.insert().from_select(("valve_id", "part", "key", "since"), rows))
 
 
-def _not_followed(file: Connection) -> list[Part]:
-    """Return the parts without triggers, which a newer version has added."""
+def _not_followed(file: Connection) -> list[sa.Table]:
+    """Return the tables without triggers: all, or those that a newer version has added."""
     query = "SELECT name FROM sqlite_master WHERE type = 'trigger'"
     there = {name for (name,) in file.exec_driver_sql(query)}
-    return [part for part in PARTS if f"unsent_{part.name}_insert" not in there]
+    return [table for table in _FOLLOWED if f"unsent_{table.name}_insert" not in there]
 
 
 def follow(path: Path) -> None:
@@ -137,19 +143,15 @@ def follow(path: Path) -> None:
     Raises HistoryError if the file cannot be written.
     """
     with contextlib.suppress(HistoryError), reading(path) as file:  # writing reports the error
-        if has_table(file, unsent) and not _not_followed(file):
+        if not _not_followed(file):
             return
     with writing(path) as file:
-        is_new, added = not has_table(file, unsent), _not_followed(file)
+        added = _not_followed(file)
         FILE_METADATA.create_all(file)
         for statement in _triggers():
             file.exec_driver_sql(statement)
         set_mark(file, "identity", uuid.uuid4().hex, is_kept=True)
-        if is_new:
-            _fill(file)
-        else:
-            for part in added:
-                _fill_part(file, part)
+        _queue(file, added)
 
 
 def count_unsent(path: Path) -> UnsentCount:
@@ -165,46 +167,39 @@ def count_unsent(path: Path) -> UnsentCount:
 
 
 def _has_unsent(file: Connection, valve: int) -> bool:
-    waits = sa.and_(unsent.c.valve_id == valve, unsent.c.part != _VALVE)
+    waits = sa.and_(unsent.c.valve_id == valve, unsent.c.part != tables.valve.name)
     return file.execute(sa.select(unsent.c.number).where(waits).limit(1)).first() is not None
 
 
 # Between file and server
 
 
-class _Batch(NamedTuple):
-    """Waiting rows in their present state, by number; None for a deleted row."""
-
-    waiting: Sequence[Unsent]
-    rows: Mapping[int, CopiedRow | None]
-    valves: Mapping[int, KeptValve]
-
-
-def _batch(path: Path, after: int) -> _Batch:
+def _batch(path: Path, after: int) -> list[Unsent]:
     """Read the first waiting rows with numbers beyond `after`, without refused rows."""
     first = (
-        sa.select(unsent.c.number, unsent.c.valve_id, unsent.c.part, unsent.c.key)
+        sa.select(unsent, tables.valve.c.name, tables.valve.c.tag)
+        .join_from(unsent, tables.valve, tables.valve.c.id == unsent.c.valve_id)
         .where(unsent.c.number > after, unsent.c.refusal.is_(None))
         .order_by(unsent.c.number)
         .limit(_MANY)
     )
     with reading(path) as file:
-        waiting = [
-            Unsent(number, valve, part, tuple(json.loads(key)))
-            for number, valve, part, key in file.execute(first)
-        ]
-        rows: dict[int, CopiedRow | None] = {}
+        waiting = [(row, tuple(json.loads(row.key))) for row in file.execute(first)]
+        states: dict[tuple[str, int, Key], CopiedRow] = {}
         for part in PARTS:
-            of_part = {one.number: (one.valve, one.key) for one in waiting if one.part == part.name}
-            chosen = rows_of(file, part, part.among(of_part.values())) if of_part else ()
-            found = {(valve, row.key): row for valve, row in chosen}
-            rows |= {number: found.get(key) for number, key in of_part.items()}
-        their = tables.valve.c.id.in_({one.valve for one in waiting})
-        valves = {
-            row.id: KeptValve(row.name, row.tag)
-            for row in file.execute(sa.select(tables.valve).where(their))
-        }
-    return _Batch(waiting, rows, valves)
+            keys = [(row.valve_id, key) for row, key in waiting if row.part == part.name]
+            for valve, found in rows_of(file, part, among(part, keys)) if keys else ():
+                states[part.name, valve, found.key] = found
+    return [
+        Unsent(
+            row.number,
+            KeptValve(row.name, row.tag),
+            row.part,
+            key,
+            states.get((row.part, row.valve_id, key)),
+        )
+        for row, key in waiting
+    ]
 
 
 def send(path: Path, server: HistoryServer, is_over: Callable[[], bool]) -> None:
@@ -216,13 +211,13 @@ def send(path: Path, server: HistoryServer, is_over: Callable[[], bool]) -> None
         identity = marked(new, "identity") or ""
     _send_to(path, identity)
     after = 0
-    while (batch := _batch(path, after)).waiting:
+    while batch := _batch(path, after):
         try:
             _deliver(path, server, batch)
         except RowRefusedError:
             _deliver_one_by_one(path, server, batch)
-        after = batch.waiting[-1].number
-        if is_over() or len(batch.waiting) < _MANY:  # the next look sends newer rows
+        after = batch[-1].number
+        if is_over() or len(batch) < _MANY:  # the next look sends newer rows
             return
 
 
@@ -233,45 +228,38 @@ def _send_to(path: Path, identity: str) -> None:
     if noted != identity:
         with writing(path) as file:
             if noted is not None:
-                _fill(file)
+                file.execute(sa.delete(unsent))
+                _queue(file, _FOLLOWED)
             set_mark(file, "sent_to", identity)
 
 
-def _deliver(path: Path, server: HistoryServer, batch: _Batch) -> None:
+def _deliver(path: Path, server: HistoryServer, batch: Sequence[Unsent]) -> None:
     with writing(server) as new:
-        there = _rows_of_valves(new, batch.valves)
+        there = _rows_of_valves(new, {one.valve for one in batch})
         for part in PARTS:
-            _deliver_part(new, part, there, batch)
-    sent = [one.number for one in batch.waiting]
+            of_part = [one for one in batch if one.part == part.name]
+            found = [(there[one.valve], one.row) for one in of_part if one.row is not None]
+            write_rows(new, part, found)
+            gone = [(there[one.valve], one.key) for one in of_part if one.row is None]
+            if gone and part not in KEPT:
+                new.execute(sa.delete(part).where(among(part, gone)))
+    sent = [one.number for one in batch]
     with writing(path) as file:  # a row changed since then has another number, and stays
         file.execute(sa.delete(unsent).where(unsent.c.number.in_(sent)))
 
 
-def _rows_of_valves(new: Connection, valves: Mapping[int, KeptValve]) -> dict[int, int]:
-    """Return the rows of valves on the server, by their rows in the file."""
-    named = tables.valve.c.name.in_([one.name for one in valves.values()])
-    known = {
-        KeptValve(row.name, row.tag): row.id
-        for row in new.execute(sa.select(tables.valve).where(named))
-    }
-    ordered = sorted(valves.items(), key=lambda item: item[1])
-    return {here: known.get(one) or valve_id(new, one) for here, one in ordered}
+def _rows_of_valves(new: Connection, valves: set[KeptValve]) -> dict[KeptValve, int]:
+    """Return the rows of valves on the server."""
+    named = sa.select(tables.valve).where(tables.valve.c.name.in_([one.name for one in valves]))
+    known = {KeptValve(row.name, row.tag): row.id for row in new.execute(named)}
+    return known | {one: valve_id(new, one) for one in sorted(valves - known.keys())}
 
 
-def _deliver_part(new: Connection, part: Part, there: Mapping[int, int], batch: _Batch) -> None:
-    of_part = [one for one in batch.waiting if one.part == part.name]
-    found = [(there[one.valve], batch.rows[one.number]) for one in of_part]
-    write_rows(new, part, [(valve, row) for valve, row in found if row is not None])
-    gone = [(there[one.valve], one.key) for one in of_part if batch.rows[one.number] is None]
-    if gone and not part.is_kept:
-        new.execute(sa.delete(part.table).where(part.among(gone)))
-
-
-def _deliver_one_by_one(path: Path, server: HistoryServer, batch: _Batch) -> None:
+def _deliver_one_by_one(path: Path, server: HistoryServer, batch: Sequence[Unsent]) -> None:
     """Send rows one by one, and note which rows the server refuses."""
-    for one in batch.waiting:
+    for one in batch:
         try:
-            _deliver(path, server, batch._replace(waiting=[one]))
+            _deliver(path, server, [one])
         except RowRefusedError as error:  # noqa: PERF203 - each is tried
             refused = sa.update(unsent).where(unsent.c.number == one.number)
             with writing(path) as file:
@@ -300,14 +288,14 @@ def _put_into(
     path: Path, valve: KeptValve, there: Connection, number: int, is_over: Callable[[], bool]
 ) -> bool:
     """Put the rows of a valve into the file in one transaction; return whether this was done."""
-    taken = [(one, [*rows_of(there, one, one.table.c.valve_id == number)]) for one in PARTS]
+    taken = [(one, [*rows_of(there, one, one.c.valve_id == number)]) for one in PARTS]
     with writing(path) as file:
         here = valve_id(file, valve)
         if is_over() or _has_unsent(file, here):
             return False
         for part, rows in taken:
-            if not part.is_kept:
-                file.execute(sa.delete(part.table).where(part.table.c.valve_id == here))
+            if part not in KEPT:
+                file.execute(sa.delete(part).where(part.c.valve_id == here))
             write_rows(file, part, [(here, row) for _, row in rows])
         file.execute(sa.delete(unsent).where(unsent.c.valve_id == here))
     return True
@@ -333,16 +321,9 @@ _PLACE = "sender"
 
 @dataclass(frozen=True)
 class SentState:
-    """State of a sender.
+    """State of a sender: waiting rows, why they are not sent (None if they are).
 
-    Attributes
-    ----------
-    count : UnsentCount
-        Waiting rows.
-    problem : str or None
-        Why the rows are not sent; None if they are.
-    is_sending : bool
-        Whether this process sends the rows of the file; else another process does.
+    `is_sending` says that this process sends the rows of the file; else another process does.
     """
 
     count: UnsentCount = _NONE_WAIT

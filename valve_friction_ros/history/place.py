@@ -150,8 +150,7 @@ class Claim:
     """A claim on the history of one valve, which ends with its process, however that ends.
 
     It is a lock on one byte of a file next to the history, at a position computed from the name of
-    the valve. If the system has no such locks, or the file cannot be created, every claim is
-    granted.
+    the valve. If the file cannot be created or locked, every claim is granted.
 
     Parameters
     ----------
@@ -175,14 +174,11 @@ class Claim:
         return self.is_granted
 
     def _locked(self) -> bool:
-        command = getattr(fcntl, "F_OFD_SETLK", None)  # Linux
-        if command is None:
-            return True
         try:
             if self._file is None:
                 self._file = os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
             lock = struct.pack("hhqqi4x", fcntl.F_WRLCK, os.SEEK_SET, self._place, 1, 0)
-            fcntl.fcntl(self._file, command, lock)
+            fcntl.fcntl(self._file, fcntl.F_OFD_SETLK, lock)
         except BlockingIOError:
             return False
         except OSError:

@@ -106,7 +106,7 @@ _WRITERS: dict[Any, Callable[[Any], Any]] = {
     tuple[int, ...]: json.dumps,
 }
 _READERS: dict[Any, Callable[[Any], Any]] = {
-    float: lambda one: math.nan if one is None else float(one),  # SQLite stores nan as NULL
+    float: lambda one: float(_number(one)),
     tuple[int, ...]: lambda one: tuple(json.loads(one)),
 }
 
@@ -350,7 +350,7 @@ def known_numbers_in(connection: Connection, name: str, valve: Valve, since: int
 
 
 def _number(value: float | None) -> float:
-    return math.nan if value is None else value
+    return math.nan if value is None else value  # SQLite stores nan as NULL
 
 
 _PLACES = {name: place for place, name in enumerate(PARAMETER_UNITS)}

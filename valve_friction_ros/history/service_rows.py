@@ -29,17 +29,11 @@ from valve_friction_ros.history.database import reading, writing
 from valve_friction_ros.history.entry import AlarmRecording, KeptValve
 from valve_friction_ros.history.history import History, HistoryFile
 from valve_friction_ros.history.rows import T, columns_of, oldest_kept, value_of, valve_id
-from valve_friction_ros.history.tables import joined, put
+from valve_friction_ros.history.tables import of_valve, put
 from valve_friction_ros.history.trend import Trend, ValveHistory, trend_of
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.response import StepAnswer, summarised
 from valve_friction_ros.usage import Usage, UsedDay, ValveUsage, total
-
-
-def _of_valve(table: sa.Table, valve: str, *order: Any) -> Any:
-    """Return a query for the rows of the valve of this name."""
-    query = sa.select(table).select_from(joined(table, tables.valve))
-    return query.where(tables.valve.c.name == valve).order_by(*order)
 
 
 def _all_of(kind: Callable[..., T], file: History, query: Any) -> tuple[T, ...]:
@@ -95,7 +89,8 @@ def keep_alarm_recording(
 def alarm_recordings(file: History, valve: str) -> tuple[AlarmRecording, ...]:
     """Return the recordings of the valve of this name, oldest first."""
     table = tables.alarm_recording
-    return _all_of(AlarmRecording, file, _of_valve(table, valve, table.c.time_ns, table.c.path))
+    query = of_valve(table, valve).order_by(table.c.time_ns, table.c.path)
+    return _all_of(AlarmRecording, file, query)
 
 
 def keep_told_level(file: HistoryFile, valve: KeptValve, level: Level) -> None:
@@ -107,7 +102,7 @@ def keep_told_level(file: HistoryFile, valve: KeptValve, level: Level) -> None:
 def read_told_level(file: History, valve: str) -> Level | None:
     """Return the last notified level of the valve of this name, if any."""
     with reading(file.place) as connection:
-        row = connection.execute(_of_valve(tables.told_level, valve)).first()
+        row = connection.execute(of_valve(tables.told_level, valve)).first()
         return None if row is None else Level(row.level)
 
 
@@ -144,7 +139,7 @@ def read_answers(file: History, valve: str, travel: float | None = None) -> tupl
     Only responses with this travel, m, are returned; None means the travel of the last response.
     """
     with reading(file.place) as connection:
-        query = _of_valve(tables.answer, valve, tables.answer.c.id)
+        query = of_valve(tables.answer, valve).order_by(tables.answer.c.id)
         rows = connection.execute(query).mappings().all()
         wanted = rows[-1]["travel"] if rows and travel is None else travel
         return tuple(value_of(StepAnswer, row) for row in rows if row["travel"] == wanted)
@@ -193,7 +188,7 @@ def read_moves(file: History, valve: str, built: Valve) -> tuple[Move, ...]:
     Only moves whose forces were computed with the present area and pressure reference are returned.
     """
     table = tables.move
-    query = _of_valve(table, valve, table.c.end_ns).where(_actuator(table, built))
+    query = of_valve(table, valve).where(_actuator(table, built)).order_by(table.c.end_ns)
     return _all_of(Move, file, query)
 
 
@@ -210,7 +205,7 @@ def read_reference(file: History, valve: str, built: Valve) -> Reference | None:
     """Return the first friction from the moves of the valve of this name, with this actuator."""
     table = tables.evidence_reference
     with reading(file.place) as connection:
-        query = _of_valve(table, valve).where(_actuator(table, built))
+        query = of_valve(table, valve).where(_actuator(table, built))
         row = connection.execute(query).mappings().first()
         return None if row is None else Reference(value_of(SlidingFriction, row), row["time_ns"])
 
@@ -224,7 +219,7 @@ def keep_change(file: HistoryFile, valve: KeptValve, built: Valve, change: Frict
 def read_change(file: History, valve: str, built: Valve) -> FrictionChange | None:
     """Return the last change of friction from the moves of the valve, with this actuator."""
     table = tables.evidence_change
-    query = _of_valve(table, valve).where(_actuator(table, built))
+    query = of_valve(table, valve).where(_actuator(table, built))
     return next(iter(_all_of(FrictionChange, file, query)), None)
 
 
@@ -292,8 +287,8 @@ def keep_renewal(file: HistoryFile, valve: KeptValve, time: int) -> None:
 def read_usage(file: History, valve: str) -> ValveUsage:
     """Return the usage of the valve of this name."""
     with reading(file.place) as connection:
-        rows = connection.execute(_of_valve(tables.usage, valve)).mappings().all()
-        renewals = connection.execute(_of_valve(tables.packing_renewal, valve))
+        rows = connection.execute(of_valve(tables.usage, valve)).mappings().all()
+        renewals = connection.execute(of_valve(tables.packing_renewal, valve))
         renewed = max((row.time_ns for row in renewals), default=0)
         days = (UsedDay(row["day"], row["renewal_ns"], value_of(Usage, row)) for row in rows)
         return ValveUsage.of(days, renewed)

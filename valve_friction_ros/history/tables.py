@@ -332,6 +332,11 @@ def joined(*some: sa.Table) -> Any:
     return found
 
 
+def of_valve(table: sa.Table, name: str) -> Any:
+    """Return a query for the rows of the valve of this name."""
+    return sa.select(table).select_from(joined(table, valve)).where(valve.c.name == name)
+
+
 _TIME = {
     "sqlite": "strftime('%Y-%m-%dT%H:%M:%SZ', time_ns / 1000000000, 'unixepoch')",
     "postgresql": "to_char(to_timestamp(time_ns / 1000000000) AT TIME ZONE 'UTC', "

@@ -26,7 +26,6 @@ from valve_friction_ros.figures.record_figures import (
     signature_loop_figure,
 )
 from valve_friction_ros.history import ValveHistory, drift_text
-from valve_friction_ros.history.trend import DAY
 from valve_friction_ros.identification import StemComparison
 from valve_friction_ros.identification.trust.verdict import Misfit
 from valve_friction_ros.model import Valve
@@ -55,7 +54,7 @@ from valve_friction_ros.reports.page import (
     write_report,
 )
 from valve_friction_ros.response import SIZES, ResponseSummary, Spread, StepAnswer
-from valve_friction_ros.streams import utc, utc_day
+from valve_friction_ros.streams import DAY, utc, utc_day
 from valve_friction_ros.usage import LimitState, Usage, ValveUsage
 from valve_friction_ros.wording import capitalised, member_words, percentage
 

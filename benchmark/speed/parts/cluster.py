@@ -23,7 +23,7 @@ from benchmark.harness.rows import Row
 from benchmark.speed.measuring import Settings
 from benchmark.speed.parts.fleet import Cost, cost_of, recordings, timed, write_recordings
 from valve_friction_ros.fleet import in_processes
-from valve_friction_ros.fleet.cluster import Cluster, cluster_at, in_cluster
+from valve_friction_ros.fleet.workers import Cluster, cluster_at, in_cluster
 
 _WORKERS = (1, 2)
 _OVERHEAD, _GAIN = 1.15, 1.8
