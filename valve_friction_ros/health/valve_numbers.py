@@ -76,26 +76,14 @@ _RECENT = 0.5
 
 
 def stem_reach(recording: Recording, valve: Valve, slip_force: float) -> dict[str, Measured]:
-    """Return the ends of the stem's motion, m, and which of them are stops.
+    """Return the ends of the stem's motion, m, and the stops that it met.
+
+    These are ``lowest_position``, ``highest_position``, ``lower_stop`` and ``upper_stop``.
 
     A stem at rest moves on as soon as the force has grown by F_s − F_c in the same direction. If it
-    rests at an end of its motion while the force grows by far more, a stop holds it. An unknown
-    F_s − F_c is estimated from rests between the ends. Without such a rest, growth by F_c is
-    required.
-
-    Parameters
-    ----------
-    recording : Recording
-        Drive and stem.
-    valve : Valve
-        Converts the drive to force.
-    slip_force : float
-        Largest possible F_s − F_c, N; nan where it is unknown.
-
-    Returns
-    -------
-    dict
-        ``lowest_position`` and ``highest_position``; ``lower_stop`` and ``upper_stop`` where met.
+    rests at an end of its motion while the force grows by far more, a stop holds it. `slip_force`
+    is the largest possible F_s − F_c, N. If it is nan, it is estimated from rests between the ends.
+    Without such a rest, growth by F_c is required.
     """
     mean = max(round(_MEAN / recording.sample_period), 1)
     position = scipy.ndimage.uniform_filter1d(recording.position, mean, mode="nearest")
