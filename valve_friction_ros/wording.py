@@ -201,7 +201,7 @@ class Code(Enum):
     SAMPLE_BACK = "{signal} returned in time"
     SENSOR_RANGE = "the sensor's range {lowest:g} to {highest:g} Pa"
     ANY_VALVE_RANGE = "the range of any valve, {lowest:g} to {highest:g} m"
-    DATA_FAULT = "{signal:or the stamps}: {cause:of sample_fault}{kind:of}"
+    DATA_FAULT = "{signal:or the stamps}: {cause:of}{cause:?, |}{kind:of}"
     OUTSIDE_TRAVEL = (
         "stem_state: {share:rounded} of its samples lie outside the travel of 0 to {travel:.4g} m, "
         "for example {reading:.4g} m: check unit (m), zero and travel{question:after : }"
@@ -500,12 +500,11 @@ _LACKS = {
     "PRECISION": "{of} is known to ±{share}, but a baseline requires ±{largest}",
     "HEALTH": "the valve is in alarm, and a new baseline could hide the cause",
 }
-_LACKS_OF_MOVES = "friction from moves in service"
 
 
 def lack_words(of: str, lack: str, share: float, largest: float) -> str:
     """Write what a baseline lacks; `lack` is the name of a `Lack`."""
-    name = _LACKS_OF_MOVES if of == "moves" else words(of)
+    name = "friction from moves in service" if of == "moves" else words(of)
     known = {"share": share, "largest": largest}
     shares = {key: "–" if math.isnan(one) else percentage(one) for key, one in known.items()}
     return _LACKS[lack].format(of=name, **shares)
@@ -640,15 +639,6 @@ _TABLES: dict[str, Mapping[str, str]] = {
         "EXCESS": "excess friction",
         "FALLEN": "friction has fallen",
         "COLLAPSED": "friction collapsed, the packing may leak",
-    },
-    "sample_fault": {
-        "DAMAGED": "damaged, ",
-        "NO_JOINT": "no joint, ",
-        "NOT_FINITE": "not finite, ",
-        "OUT_OF_RANGE": "out of range, ",
-        "REPEATED": "repeated, ",
-        "OVERTAKEN": "overtaken, ",
-        "BACK": "back, ",
     },
     "rejected": {
         "DAMAGED": "the messages are damaged: check the publisher",

@@ -308,10 +308,10 @@ class TestBaseline:
         monitor.accept(with_values(**nothing), START)
         with pytest.raises(RefusalError) as refusal:
             monitor.result_as_baseline()
+        why = "is not identifiable (the record does not determine it)"
         assert str(refusal.value).startswith(
-            "this result cannot be the baseline: coulomb friction is not identifiable (the record "
-            "does not determine it); sliding friction is not identifiable (the record does not "
-            "determine it): record more strokes, "
+            f"this result cannot be the baseline: coulomb friction {why}; sliding friction {why}: "
+            "record more strokes, "
         )
         assert monitor.baseline == before
         assert monitor.diagnosis().level == Level.OK

@@ -270,13 +270,6 @@ class TestRestart:
         monitor.accept(sliding(150.0, 2.0, 6.0), START + 3 * DAY)
         assert monitor.diagnosis().level is Level.OK
 
-    def test_a_record_that_can_be_compared_ends_it(self, kept, sliding, nothing):
-        monitor = self.again(kept)
-        monitor.accept(sliding(150.0, 2.0), START + 2 * DAY)
-        assert monitor.diagnosis().level is Level.OK
-        monitor.accept(nothing, START + 3 * DAY)
-        assert monitor.diagnosis().level is Level.OK
-
     @pytest.mark.parametrize("is_before", [True, False])
     def test_a_new_baseline_ends_it(self, kept, is_before):
         monitor = self.again(kept, OTHER if is_before else HEALTHY)

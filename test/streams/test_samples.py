@@ -27,16 +27,13 @@ from valve_friction_ros.streams import (
     Intake,
     Kind,
     RecordBuffer,
-    SampleFault,
     Samples,
-    Signal,
     nanoseconds,
     rows_arrived,
     uniform_recording,
     utc,
 )
 from valve_friction_ros.streams.samples import SampleBuffer
-from valve_friction_ros.wording import Code
 
 START = 1_700_000_000_000_000_000  # ns, where float seconds are 238 ns apart
 
@@ -113,8 +110,6 @@ def test_a_stamp_is_nanoseconds_since_1970_in_utc():
 
 
 ARRIVALS_START = 1_700_000_000  # s
-FAULTS = {Code[f"SAMPLE_{fault.name}"]: fault for fault in SampleFault}
-FAULTS[Code.BUFFER_CLEARED] = SampleFault.BACK
 
 
 def arrivals(samples):
@@ -123,20 +118,10 @@ def arrivals(samples):
 
 
 def add_one_by_one(buffer, samples):
-    """The readable form of `RecordBuffer.add_arrivals`."""
-    rejected, cleared = Counter(), []
-    for kind, stamp, value in samples:
-        if kind == Kind.PRESSURE:
-            problem = buffer.add_pressure(stamp, value)
-        else:
-            problem = buffer.add_position(stamp, None if kind == Kind.NO_POSITION else value)
-        if problem is not None:
-            signal = Signal.PRESSURE if kind == Kind.PRESSURE else Signal.POSITION
-            fault = FAULTS[problem.code]
-            rejected[signal, fault] += 1
-            if fault is SampleFault.BACK:
-                cleared.append(problem)
-    return Intake(rejected, cleared[0] if cleared else None)
+    """Each as a block of its own."""
+    intakes = [buffer.add_arrivals(arrivals([one])) for one in samples]
+    rejected = sum((Counter(one.rejected) for one in intakes), Counter())
+    return Intake(rejected, next((one.cleared for one in intakes if one.cleared), None))
 
 
 @st.composite

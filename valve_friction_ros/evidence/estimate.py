@@ -15,7 +15,7 @@ declared.
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -309,12 +309,6 @@ class Evidence:
     parameters: Mapping[str, Parameter]
     sliding_speed: float = math.nan
     changes: tuple[FrictionChange, ...] = ()
-    values: Mapping[str, float] = field(init=False, repr=False, compare=False)
-
-    def __post_init__(self) -> None:
-        """Collect the values of the parameters by name."""
-        values = {name: one.value for name, one in self.parameters.items()}
-        object.__setattr__(self, "values", values)
 
     @property
     def change(self) -> FrictionChange | None:

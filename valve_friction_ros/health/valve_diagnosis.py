@@ -102,20 +102,6 @@ def diagnose_valve(
 
     The diagnosis of the friction states if a common factor explains both friction and spring. There
     are no other findings without a baseline, or with a baseline of friction alone.
-
-    Examples
-    --------
-    >>> import valve_friction_ros as vf
-    >>> from valve_friction_ros.health import diagnose_valve
-    >>> valve = vf.Valve(diaphragm_area=0.0445, travel=28.575e-3)
-    >>> pressure = 6.5e4 + 5e4 * np.sin(2 * np.pi * np.arange(4000) / 1000)
-    >>> def identified(spring_constant):
-    ...     packing = vf.KarnoppParameters(1.6, 4865.0, 150.0, 150.0, spring_constant)
-    ...     stem = vf.simulate(valve, packing, pressure, sample_period=0.01)
-    ...     return vf.identify(vf.Recording(0.01, pressure, stem.position), valve)
-    >>> healthy = vf.Baseline.of(identified(2.05e5))
-    >>> [str(one)[:58] for one in diagnose_valve(identified(1.37e5), healthy).findings]
-    ['ERROR: the spring constant has changed: 0.668 times (0.66']
     """
     friction = diagnose(result, result.valve, baseline, limits)
     if baseline is None or not baseline.numbers:

@@ -256,7 +256,6 @@ A weak viscous friction cannot be distinguished from a lag or from friction that
 It changes with either, and with the motion."""
 
 _COULOMB = "coulomb_friction"
-_DOUBTED = "slip_force"
 _OF_THE_BALANCE = ("spring_constant", "spring_preload")
 _SLIP_SHARE = 0.5
 """Share of a slip force by which it may be wrong, whatever the law of the friction.
@@ -293,9 +292,9 @@ def valve_numbers(result: Result) -> dict[str, Measured]:
         if result.parameters[name].without_calibration.verdict is not Verdict.IDENTIFIED:
             fit.pop(name, None)
     if result.misfit is not None and not result.misfit.describes:
-        identified = (name for name in _OF_THE_BALANCE if name in result.parameters)
-        sure = [n for n in identified if result.parameters[n].verdict is Verdict.IDENTIFIED]
-        fit = {name: one for name, one in fit.items() if name in (_DOUBTED, *sure)}
+        balance = {n: result.parameters[n] for n in _OF_THE_BALANCE if n in result.parameters}
+        sure = [name for name, one in balance.items() if one.verdict is Verdict.IDENTIFIED]
+        fit = {name: one for name, one in fit.items() if name in ("slip_force", *sure)}
     slip = fit.get("slip_force")
     largest = math.nan if slip is None else max(slip.value, 0.0) + slip.half_width
     numbers = sensor_noises(result.recording)
