@@ -27,9 +27,11 @@ from valve_friction_ros.health import (
     Measured,
     MonitorSettings,
     SlidingFriction,
+    StandingAlarm,
     StatusSignal,
     diagnose,
 )
+from valve_friction_ros.health.friction_monitor import limited
 from valve_friction_ros.history import HistoryFile, entry_of
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.model import BENCH_VALVE, Valve
@@ -139,6 +141,14 @@ def test_what_is_surely_over_does_not_come_back(monitor, sliding, nothing):
         )
     monitor.accept(sliding(150.0, 2.0, 6.0), START + 3 * DAY)
     assert monitor.diagnosis().level is Level.OK
+
+
+def test_what_is_not_lowered_keeps_its_signal():
+    """As that of an alarm which a new scale of the drive may explain."""
+    check = StatusSignal.CHECK_FUNCTION
+    alarm = StandingAlarm(Level.ERROR, check, FrictionState.EXCESS, quoted("so"), START)
+    assert limited(alarm, Level.ERROR) is alarm
+    assert limited(alarm, Level.WARN).status_signal is StatusSignal.MAINTENANCE_REQUIRED
 
 
 LOW_PLACES = {

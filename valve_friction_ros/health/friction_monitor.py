@@ -187,7 +187,11 @@ def identify_snapshot(snapshot: Snapshot, settings: MonitorSettings) -> Result:
         if not isinstance(refusal, RefusedRecordError):
             refusal = RefusedRecordError.of(refusal, {})
         raise RefusedRecordError(f"{refusal}{why}", refusal.numbers, refusal.is_fault) from refusal
-    return result if count == 1 else _of_means(result, count)
+    if count == 1:
+        return result
+    told = f"the record consists of averages of {count} successive samples"
+    evidence = {**result.evidence, "averaged_samples": count}
+    return replace(result, evidence=evidence, findings=(*result.findings, told))
 
 
 def identify_recording(recording: Recording, settings: MonitorSettings) -> Result:
@@ -224,16 +228,6 @@ def diagnose_outcome(
 
 def _no_estimate(reason: str | Statement) -> Diagnosis:
     return Diagnosis.of(FrictionState.UNKNOWN, said(Code.NO_ESTIMATE, reason=reason))
-
-
-def _of_means(result: Result, count: int) -> Result:
-    """Return a result whose evidence states how many samples each mean of its record covers."""
-    told = f"the record consists of averages of {count} successive samples"
-    return replace(
-        result,
-        evidence={**result.evidence, "averaged_samples": count},
-        findings=(*result.findings, told),
-    )
 
 
 class _Raised(NamedTuple):
