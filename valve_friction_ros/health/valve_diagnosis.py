@@ -17,7 +17,7 @@ from typing import NamedTuple
 from valve_friction_ros.health.baseline import Baseline
 from valve_friction_ros.health.diagnosis import Diagnosis, FrictionLimits, diagnose
 from valve_friction_ros.health.levels import Finding, Level, StatusSignal
-from valve_friction_ros.health.measured import Measured, difference, valve_changes
+from valve_friction_ros.health.measured import Measured, difference, ratio_of, valve_changes
 from valve_friction_ros.health.valve_numbers import valve_numbers
 from valve_friction_ros.identification import Result
 from valve_friction_ros.model.drive import Drive
@@ -255,7 +255,7 @@ def _preload_ratio(case: _Case) -> Measured | None:
         return None
     if min(now.value - now.half_width, healthy.value - healthy.half_width) <= 0:
         return None
-    return valve_changes({"spring_constant": now}, {"spring_constant": healthy})["spring_constant"]
+    return ratio_of(now, healthy)
 
 
 def _preload(case: _Case) -> Iterator[Finding]:
