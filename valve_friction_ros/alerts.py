@@ -196,16 +196,6 @@ class Webhook:
         """Scheme, host and port."""
         return self.scheme, self.host, self.port
 
-    @property
-    def is_encrypted(self) -> bool:
-        """Whether alerts are sent over TLS."""
-        return self.scheme == "https"
-
-    @property
-    def is_here(self) -> bool:
-        """Whether the host is this machine."""
-        return is_loopback(self.host)
-
     def __str__(self) -> str:
         """Return scheme, host and port."""
         host = f"[{self.host}]" if ":" in self.host else self.host
@@ -295,15 +285,16 @@ class _Connection(http.client.HTTPConnection):
     """A connection with a limit on its total time, including the time to connect."""
 
     def __init__(self, webhook: Webhook, limit: float) -> None:
-        proxy = None if webhook.is_here else _proxy(webhook.host)
+        proxy = None if is_loopback(webhook.host) else _proxy(webhook.host)
         if proxy is None:
             super().__init__(webhook.host, webhook.port, timeout=limit)
         else:
             super().__init__(proxy.hostname or "", proxy.port or 80, timeout=limit)
             self.set_tunnel(webhook.host, webhook.port, _authorization(proxy.netloc))
-        self.default_port = 443 if webhook.is_encrypted else 80  # keeps Host short
-        self._tls_name = webhook.host if webhook.is_encrypted else None
-        self._is_late = False
+        self.default_port = _PORTS[webhook.scheme]  # keeps Host short
+        self._tls_name = webhook.host if webhook.scheme == "https" else None
+        self.is_late = False
+        """Whether the connection was cut because its time was over."""
         self._end = threading.Timer(limit, self._cut)
         self._end.daemon = True
 
@@ -316,16 +307,15 @@ class _Connection(http.client.HTTPConnection):
         self.close()
 
     def _cut(self) -> None:
-        self._is_late = True
-        with contextlib.suppress(
-            OSError, AttributeError, TypeError
-        ):  # not connected yet, or closed
+        self.is_late = True
+        # The other errors: not connected yet, or closed.
+        with contextlib.suppress(OSError, AttributeError, TypeError):
             # SSLSocket.shutdown would remove the encryption while the other thread uses it.
             socket.socket.shutdown(self.sock, socket.SHUT_RDWR)
 
     def require_time(self) -> None:
         """Raise TimeoutError if the time is over: the answer read may be incomplete."""
-        if self._is_late:
+        if self.is_late:
             raise TimeoutError
 
     def connect(self) -> None:
@@ -338,11 +328,6 @@ class _Connection(http.client.HTTPConnection):
             self.require_time()
             self.sock.do_handshake()
         self.require_time()
-
-    @property
-    def is_late(self) -> bool:
-        """Whether the connection was cut because its time was over."""
-        return self._is_late
 
 
 def _proxy(host: str) -> SplitResult | None:
@@ -455,55 +440,40 @@ class OutboxState(NamedTuple):
     settled: Level | None = None
 
 
-@dataclass(eq=False)
-class _QueuedLetter:
-    letter: Letter
-    tries: int = 0
-
-
 class Outbox:
-    """The alerts of one valve, sent in order: the last one to arrive is the newest."""
+    """The alerts of one valve to a webhook, sent in order: the last one to arrive is the newest.
+
+    `due`, `begin` and `end` need the lock of the sender.
+    """
 
     def __init__(
         self,
+        webhook: Webhook,
         changed: threading.Condition,
         waits: tuple[float, ...],
         wake: Callable[[], None],
     ) -> None:
+        self.webhook = webhook
+        self.tried = 0.0
+        """Time of the last attempt, s of the monotonic clock."""
         self._changed, self._waits, self._wake = changed, waits, wake
-        self._letters: deque[_QueuedLetter] = deque()
+        self._letters: deque[Letter] = deque()
+        self._tries = 0
+        """Attempts for the first letter."""
         self._is_sending = False
-        self._due = self._tried = 0.0
-        self._webhook: Webhook | None = None
+        self._due = 0.0
         self._delivered = self._given_up = 0
         self._problem: str | None = None
         self._lost: str | None = None
         self._settled: Level | None = None
 
-    def address(self, webhook: Webhook | None) -> None:
-        """Send all waiting and future letters to this webhook; None: drop them."""
-        if webhook == self._webhook:
-            return
-        with self._changed:
-            self._webhook, self._due = webhook, 0.0
-            self._problem = self._lost = None
-            if webhook is None:
-                self._letters.clear()
-            elif self._letters:
-                self._wake()
-
     def put(self, letter: Letter) -> None:
-        """Queue a letter and return at once; without a webhook it is dropped."""
+        """Queue a letter and return at once."""
         with self._changed:
-            if self._webhook is None:
-                return
-            self._letters.append(_QueuedLetter(letter))
+            self._letters.append(letter)
             if len(self._letters) > _MOST_WAITING:
                 oldest = 1 if self._is_sending else 0
-                self._give_up(
-                    self._letters[oldest], f"more than {_MOST_WAITING} alerts are waiting"
-                )
-                del self._letters[oldest]
+                self._give_up(oldest, f"more than {_MOST_WAITING} alerts are waiting")
             self._wake()
 
     def state(self) -> OutboxState:
@@ -513,65 +483,43 @@ class Outbox:
             counts = waiting, self._delivered, self._given_up
             return OutboxState(*counts, self._problem, self._lost, self._settled)
 
-    @property
-    def place(self) -> Place | None:
-        """Scheme, host and port that alerts go to; None without a webhook."""
-        return None if self._webhook is None else self._webhook.place
+    def due(self) -> float:
+        """Return the time of the next attempt, s of the monotonic clock; inf if nothing waits."""
+        return self._due if self._letters else math.inf
 
-    @property
-    def tried(self) -> float:
-        """Time of the last attempt, s of the monotonic clock."""
-        return self._tried
+    def begin(self) -> Letter:
+        """Return the letter to try now."""
+        self._is_sending, self.tried = True, time.monotonic()
+        return self._letters[0]
 
-    def due(self) -> float | None:
-        """Return the time of the next attempt, s of the monotonic clock; None if nothing waits."""
-        return self._due if self._letters else None
-
-    def begin(self) -> tuple[_QueuedLetter, Webhook]:
-        """Return the letter to try now and its webhook; the caller holds the lock."""
-        assert self._webhook is not None  # noqa: S101 - else nothing waits
-        self._is_sending, self._tried = True, time.monotonic()
-        return self._letters[0], self._webhook
-
-    def skip(self, failure: DeliveryError) -> None:
-        """Record the failure of another valve at the same host; the caller holds the lock."""
-        if self._webhook is not None:
-            self.end(self._letters[0], self._webhook, failure)
-
-    def end(self, queued: _QueuedLetter, webhook: Webhook, failure: DeliveryError | None) -> None:
-        """Record the outcome of an attempt; the caller holds the lock."""
+    def end(self, failure: DeliveryError | None) -> None:
+        """Record the outcome of an attempt for the first letter."""
         self._is_sending = False
-        if webhook != self._webhook:
+        if failure is None:
+            self._delivered += 1
+            self._settle(0)
+            self._problem = self._lost = None
             return
-        with contextlib.suppress(ValueError):  # dropped meanwhile
-            if failure is None:
-                self._letters.remove(queued)
-                self._delivered += 1
-                self._settle(queued)
-                self._problem = self._lost = None
-                return
-            place = self._letters.index(queued)
-            self._problem = str(failure)
-            queued.tries += 1
-            if failure.is_final or queued.tries > len(self._waits):
-                del self._letters[place]
-                self._give_up(queued, str(failure))
-            else:
-                self._due = time.monotonic() + self._waits[queued.tries - 1]
+        self._problem = str(failure)
+        self._tries += 1
+        if failure.is_final or self._tries > len(self._waits):
+            self._give_up(0, str(failure))
+        else:
+            self._due = time.monotonic() + self._waits[self._tries - 1]
 
-    def is_due_at(self, place: Place, now: float) -> bool:
-        """Return whether an attempt at a host is due; the caller holds the lock."""
-        due = self.due()
-        return self.place == place and due is not None and due <= now
-
-    def _give_up(self, queued: _QueuedLetter, cause: str) -> None:
+    def _give_up(self, place: int, cause: str) -> None:
         self._given_up += 1
-        self._settle(queued)
-        self._lost = f"{queued.letter.title} was not delivered: {cause}"
+        self._lost = f"{self._settle(place).title} was not delivered: {cause}"
 
-    def _settle(self, queued: _QueuedLetter) -> None:
-        if queued.letter.new_level is not None:
-            self._settled = queued.letter.new_level
+    def _settle(self, place: int) -> Letter:
+        """Remove a letter from the queue, and return it."""
+        letter = self._letters[place]
+        del self._letters[place]
+        if place == 0:
+            self._tries = 0
+        if letter.new_level is not None:
+            self._settled = letter.new_level
+        return letter
 
 
 class AlertSender:
@@ -605,9 +553,9 @@ class AlertSender:
         self._is_closed = False
         self._thread: threading.Thread | None = None
 
-    def outbox(self) -> Outbox:
-        """Return a new queue for one valve."""
-        outbox = Outbox(self._changed, self._waits, self._wake)
+    def outbox(self, webhook: Webhook) -> Outbox:
+        """Return a new queue for one valve and its webhook."""
+        outbox = Outbox(webhook, self._changed, self._waits, self._wake)
         with self._changed:
             self._outboxes.append(outbox)
         return outbox
@@ -630,45 +578,39 @@ class AlertSender:
         with self._changed:
             while not self._is_closed:
                 now = time.monotonic()
-                waiting = [(due, one) for one in self._outboxes if (due := one.due()) is not None]
-                for _, outbox in sorted(waiting, key=lambda each: each[1].tried):
-                    self._begin(outbox, now)
-                later = [due for due, _ in waiting if due > now]
+                for outbox in sorted(self._outboxes, key=lambda one: one.tried):
+                    if outbox.due() <= now:
+                        self._begin(outbox)
+                later = [due for one in self._outboxes if now < (due := one.due()) < math.inf]
                 self._changed.wait(min(later) - now if later else None)
 
-    def _begin(self, outbox: Outbox, now: float) -> None:
-        """Try the first alert of a queue if it is due and a thread is free."""
-        place = outbox.place
-        if place is None or place in self._under_way or not outbox.is_due_at(place, now):
+    def _begin(self, outbox: Outbox) -> None:
+        """Try the first alert of a queue if a thread is free."""
+        place = outbox.webhook.place
+        if place in self._under_way:
             return
         is_silent, retries = place in self._silent, sum(self._under_way.values())
         if len(self._under_way) >= _MOST_TRIES or (is_silent and retries >= _MOST_RETRIES):
             return
         self._under_way[place] = is_silent
-        work = outbox, *outbox.begin()
+        work = outbox, outbox.begin()
         threading.Thread(target=self._try, args=work, name="alert", daemon=True).start()
 
-    def _try(self, outbox: Outbox, queued: _QueuedLetter, webhook: Webhook) -> None:
-        failure = self._failure(queued.letter, webhook)
+    def _try(self, outbox: Outbox, letter: Letter) -> None:
+        place, failure = outbox.webhook.place, self._failure(letter, outbox.webhook)
         with self._changed:
-            outbox.end(queued, webhook, failure)
-            del self._under_way[webhook.place]
+            outbox.end(failure)
+            del self._under_way[place]
             if failure is None or failure.is_answered:
-                self._silent.discard(webhook.place)
+                self._silent.discard(place)
             else:
-                self._silent.add(webhook.place)
-                self._fail_together(webhook, failure)
+                self._silent.add(place)
+                # A dead host shared by many valves is tried once per round.
+                now = time.monotonic()
+                for other in self._outboxes:
+                    if other.webhook.place == place and other.due() <= now:
+                        other.end(failure)
             self._changed.notify()
-
-    def _fail_together(self, webhook: Webhook, failure: DeliveryError) -> None:
-        """Record the failure for every alert due at a host that does not answer.
-
-        A dead host shared by many valves is thus tried once per round.
-        """
-        now = time.monotonic()
-        for outbox in self._outboxes:
-            if outbox.is_due_at(webhook.place, now):
-                outbox.skip(failure)
 
     def _failure(self, letter: Letter, webhook: Webhook) -> DeliveryError | None:
         try:

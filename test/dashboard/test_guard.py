@@ -7,20 +7,23 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The gate before a running NiceGUI page, by real HTTP requests, WebSockets and a browser."""
+"""The gate before a running NiceGUI page, by real connections, HTTP requests and a browser."""
 
 import asyncio
+import contextlib
 import json
 import os
 import re
+import resource
 import signal
 import socket
 import ssl
 import subprocess
 import sys
 import time
-from contextlib import closing, contextmanager
+from contextlib import closing
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 from browser import axe_violations, chromium
@@ -35,9 +38,10 @@ pytest.importorskip("httpx", reason="run `make venv-dashboard`")
 pytest.importorskip("nicegui", reason="run `make venv-dashboard`")
 
 import httpx
+import websockets
 from starlette.responses import PlainTextResponse
 
-from valve_friction_ros.dashboard.gate import Gate
+from valve_friction_ros.dashboard.gate import ARRIVAL_TIME, MOST_OF_A_CLIENT, Gate
 from valve_friction_ros.dashboard.pages.server import LightlyPacked
 
 URL = "http://127.0.0.1:8080"
@@ -46,9 +50,34 @@ ACCOUNTS = f"{quick_account('anna')};{quick_account('bo', Role.VIEW)}"
 POLLING = "/_nicegui_ws/socket.io/?EIO=4&transport=polling"
 
 
-@contextmanager
+class Served(NamedTuple):
+    """A running page."""
+
+    port: int
+    process: subprocess.Popen
+    output: Path
+
+    @property
+    def url(self):
+        return f"http://127.0.0.1:{self.port}"
+
+    def opens(self):
+        with contextlib.suppress(httpx.HTTPError):
+            return "Operate" in httpx.get(self.url, timeout=5.0).text
+        return False
+
+    def connect(self, source, sent):
+        made = socket.create_connection(("127.0.0.1", self.port), PATIENCE, (source, 0))
+        made.sendall(sent)
+        return made
+
+    def open_files(self):
+        return len(list(Path(f"/proc/{self.process.pid}/fd").iterdir()))
+
+
+@contextlib.contextmanager
 def served(folder, *arguments, accounts=""):
-    """Run the page; yield its port, and see that Ctrl-C ends it."""
+    """Run the page, and see that Ctrl-C ends it."""
     port = free_port()
     # NiceGUI takes a process that pytest has started for a test of its own kind.
     hidden = {name: text for name, text in os.environ.items() if not name.startswith("PYTEST")}
@@ -69,7 +98,7 @@ def served(folder, *arguments, accounts=""):
                 return tried.connect_ex(("127.0.0.1", port)) == 0
 
         wait_until(is_open, output.read_text)
-        yield port
+        yield Served(port, process, output)
         process.send_signal(signal.SIGINT)
         process.wait(timeout=PATIENCE)
     finally:
@@ -79,18 +108,25 @@ def served(folder, *arguments, accounts=""):
     assert "Traceback" not in output.read_text(), output.read_text()
 
 
+@pytest.fixture
+def browser():
+    """Not longer than its test: asyncio cannot run beside it."""
+    with chromium() as one:
+        yield one
+
+
 @pytest.fixture(scope="module")
 def private(tmp_path_factory):
     """A page with accounts."""
-    with served(tmp_path_factory.mktemp("private"), accounts=ACCOUNTS) as port:
-        yield f"http://127.0.0.1:{port}"
+    with served(tmp_path_factory.mktemp("private"), accounts=ACCOUNTS) as page:
+        yield page.url
 
 
 @pytest.fixture(scope="module")
 def local(tmp_path_factory):
     """A page of this machine, without accounts."""
-    with served(tmp_path_factory.mktemp("local")) as port:
-        yield f"http://127.0.0.1:{port}"
+    with served(tmp_path_factory.mktemp("local")) as page:
+        yield page.url
 
 
 def visitor(url, **headers):
@@ -410,9 +446,9 @@ def encrypted(tmp_path_factory):
     folder = tmp_path_factory.mktemp("encrypted")
     certificate, key = certificate_pair(folder)
     words = ("--certificate", certificate, "--key", key, "--session_file", folder / "sessions")
-    with served(folder, *words, accounts=ACCOUNTS) as port:
+    with served(folder, *words, accounts=ACCOUNTS) as page:
         trusted = ssl.create_default_context(cafile=certificate)
-        url = f"https://localhost:{port}"
+        url = f"https://localhost:{page.port}"
         with httpx.Client(base_url=url, verify=trusted, timeout=PATIENCE) as client:
             yield client, folder
 
@@ -446,7 +482,7 @@ def test_tries_are_bounded(encrypted):
         assert re.search("try again in 1[45] min", answer.text)
 
 
-def log_in_and_out(private, browser):
+def test_log_in_and_out_in_a_browser(private, browser):
     """The browser's own rules are kept: no violation of the policy, no request to another host."""
     page = browser.new_page(viewport={"width": 390, "height": 900})
     page.set_default_timeout(PATIENCE * 1000)
@@ -478,6 +514,80 @@ def log_in_and_out(private, browser):
     assert not [line for line in said if "Error" in line and "401" not in line], said
 
 
-def test_log_in_and_out_in_a_browser(private):
-    with chromium() as browser:
-        log_in_and_out(private, browser)
+# Connections that send no request, or only half of one
+
+FILES = 1024
+"""Files that the server may open: the usual limit of a shell."""
+HALF = b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n"
+
+
+@pytest.fixture
+def page(tmp_path):
+    """A page in a process of few files."""
+    with served(tmp_path) as made:
+        resource.prlimit(made.process.pid, resource.RLIMIT_NOFILE, (FILES, FILES))
+        assert made.opens()
+        yield made
+
+
+@pytest.fixture
+def opened():
+    with contextlib.ExitStack() as stack:
+        yield stack.enter_context
+
+
+@pytest.mark.parametrize("source", ["127.0.0.2", "127.0.0.1"])
+def test_1100_half_requests_do_not_take_the_pages(page, opened, source):
+    """Neither from another client, nor from the client's own address."""
+    before = page.open_files()
+    for _ in range(1100):
+        opened(page.connect(source, HALF))
+    assert page.opens()
+    assert page.open_files() <= before + MOST_OF_A_CLIENT + 1
+    wait_until(lambda: page.open_files() <= before + 2, patience=ARRIVAL_TIME + 10.0)
+    assert page.opens()
+    lines = [line for line in page.output.read_text().splitlines() if source in line]
+    assert 1 <= len(lines) <= 60
+    assert set(lines) == {f"a connection of {source} was ended: more than 256 were open"}
+
+
+def time_until_the_end(made, slowly):
+    """Time, s, after which the server ends a connection on which a header comes now and then."""
+    begun = time.monotonic()
+    made.settimeout(1.0)
+    while time.monotonic() < begun + 3 * ARRIVAL_TIME:
+        with contextlib.suppress(TimeoutError):
+            try:
+                made.send(slowly)
+                if not made.recv(65536):
+                    break
+            except ConnectionError:
+                break
+    return time.monotonic() - begun
+
+
+@pytest.mark.parametrize(("sent", "slowly"), [(b"", b""), (HALF, b""), (HALF, b"X-Slow: 1\r\n")])
+def test_half_a_request_ends_after_ten_seconds(page, opened, sent, slowly):
+    """Without a byte, as browsers do, which is not logged; within the headers, slow ones too."""
+    made = opened(page.connect("127.0.0.2", sent))
+    assert 0.9 * ARRIVAL_TIME < time_until_the_end(made, slowly) < 2 * ARRIVAL_TIME
+    told = "a connection of 127.0.0.2 was ended: its request did not arrive within 10 s"
+    assert (told in page.output.read_text()) is bool(sent)
+
+
+def test_pages_that_are_open_live_on(page, opened):
+    """A WebSocket outlives the time for requests, and a crowd of its own address."""
+    address = page.url.replace("http", "ws") + POLLING.replace("polling", "websocket")
+
+    async def visit():
+        async with websockets.connect(address, origin=page.url, ping_interval=None) as one:
+            assert (await one.recv()).startswith("0{")
+            begun = time.monotonic()
+            for _ in range(400):
+                opened(page.connect("127.0.0.1", HALF))
+            await one.send("40")
+            while time.monotonic() < begun + ARRIVAL_TIME + 5.0:
+                if await asyncio.wait_for(one.recv(), PATIENCE) == "2":  # are you there?
+                    await one.send("3")
+
+    asyncio.run(visit())

@@ -55,9 +55,15 @@ def file(tmp_path):
     return made
 
 
-def test_it_is_read_again_when_it_has_changed(file):
-    kept = HistoryCache(file.path)
-    assert kept.refresh()
+@pytest.fixture
+def kept(file):
+    """The history, as read once."""
+    made = HistoryCache(file.path)
+    assert made.refresh()
+    return made
+
+
+def test_it_is_read_again_when_it_has_changed(file, kept):
     assert not kept.refresh()
     assert kept.valves == (VALVE,)
     before = kept.spark(VALVE.name)
@@ -135,9 +141,7 @@ def test_a_row_that_is_written_before_and_arrives_after_another_is_seen(database
     assert not kept._rows
 
 
-def test_another_file_at_the_path_is_read_from_its_beginning(file, tmp_path):
-    kept = HistoryCache(file.path)
-    kept.refresh()
+def test_another_file_at_the_path_is_read_from_its_beginning(file, kept, tmp_path):
     other = HistoryFile(tmp_path / "other.sqlite")
     other.set_baseline(OTHER, KeptBaseline(BASELINE, START, START))
     for day in range(3):
@@ -151,9 +155,7 @@ def test_another_file_at_the_path_is_read_from_its_beginning(file, tmp_path):
     assert kept.spark(VALVE.name) is None
 
 
-def test_what_is_written_often_draws_nothing_anew(file):
-    kept = HistoryCache(file.path)
-    kept.refresh()
+def test_what_is_written_often_draws_nothing_anew(file, kept):
     mark, revision = history_mark(file), kept.revision
     keep_usage(file, VALVE, "run", [UsedDay(20_000, 0, Usage(1.0, 2, 3, (4,) * 20))])
     assert history_mark(file) == mark
@@ -196,9 +198,7 @@ def series(chart, name):
     return next(one for one in chart["series"] if one["name"] == name)
 
 
-def test_the_chart_shows_what_the_figure_shows(file):
-    kept = HistoryCache(file.path)
-    kept.refresh()
+def test_the_chart_shows_what_the_figure_shows(kept):
     history = kept.valve(VALVE.name)
     chart = trend_chart(history, ZoneInfo("UTC"), NOW)
     json.dumps(chart, allow_nan=False)  # what goes to the browser
@@ -217,9 +217,7 @@ def test_the_chart_shows_what_the_figure_shows(file):
     assert middle[0][1] == pytest.approx(trend.line.at(0.0), rel=1e-5)
 
 
-def test_the_time_axis_is_the_clock_of_the_zone(file):
-    kept = HistoryCache(file.path)
-    kept.refresh()
+def test_the_time_axis_is_the_clock_of_the_zone(kept):
     chart = trend_chart(kept.valve(VALVE.name), ZoneInfo("Asia/Kolkata"), NOW)
     assert series(chart, "identified")["data"][0][0] == START // 1_000_000 + 5.5 * 3600 * 1000
 

@@ -10,7 +10,6 @@
 """Signals thinned for a screen."""
 
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -47,16 +46,6 @@ def test_a_spike_of_one_sample_is_seen():
     assert pressure.times.size <= 1000
     assert pressure.times[-1] == 0.0
     assert stem.times.size == 0
-
-
-def test_only_the_last_seconds_are_kept():
-    strip = LiveStrip(10.0)
-    for begin in range(0, 40, 5):
-        stamps = (begin + np.arange(500) / 100) * SECOND
-        strip.add(1, stamps.astype(np.int64), np.full(500, float(begin)))
-    stem = strip.strips(10_000)[1]
-    assert stem.times[0] == pytest.approx(-10.0)
-    assert set(stem.values) == {25.0, 30.0, 35.0}
 
 
 def test_a_bag_that_begins_again_empties_the_signal():

@@ -15,10 +15,16 @@ import time
 import pytest
 
 from valve_friction_ros.dashboard import Answer, DashboardOptions, ServiceRequest
-from valve_friction_ros.dashboard.alarm_list import Asked, HistoryOperator, request_of
-from valve_friction_ros.dashboard.context import GuardedOperator, ValveFiles
+from valve_friction_ros.dashboard.context import DashboardContext, ValveFiles
 from valve_friction_ros.dashboard.history_cache import HistoryCache
-from valve_friction_ros.health import AlarmAction, AlarmKind, Condition, Level, StatusSignal
+from valve_friction_ros.health import (
+    AlarmAction,
+    AlarmKind,
+    AlarmRequest,
+    Condition,
+    Level,
+    StatusSignal,
+)
 from valve_friction_ros.history import (
     AlarmFilter,
     History,
@@ -31,24 +37,36 @@ from valve_friction_ros.history import (
 
 
 class Visit:
-    """A visitor, and what was called and logged."""
+    """A visitor, known as in NiceGUI in the page's own task, and what was called and logged."""
 
-    def __init__(self, name, may):
+    def __init__(self, name, may, history=None, is_live=True):
         self.who, self.may, self.called, self.logged = name, may, [], []
-        self.operator = GuardedOperator(self, self, self.logged.append)
+        services = self.serve if is_live else None
+        self.context = DashboardContext(None, None, history, self, self.logged.append, services)
+
+    def run(self, coroutine):
+        async def page():
+            self.task = asyncio.current_task()
+            return await coroutine
+
+        return asyncio.run(page())
 
     def name(self):
-        return self.who
+        return self.who if self.task is asyncio.current_task() else ""
 
     def may_operate(self):
-        return self.may
+        return self.may and self.task is asyncio.current_task()
 
-    async def call(self, node, service):
-        self.called.append((node, service))
+    async def serve(self, node, request):
+        self.called.append((node, request))
         return Answer(True, "done")
 
     def press(self):
-        return asyncio.run(self.operator.call("/fv\x1b_101/identifier", ServiceRequest("identify")))
+        return self.run(self.context.call("/fv\x1b_101/identifier", "identify"))
+
+    def acknowledge(self, node, text=""):
+        request = AlarmRequest(AlarmAction.ACKNOWLEDGE, "bo", text)
+        return self.run(self.context.answer_alarm(node, AlarmKind.FRICTION_HIGH, request))
 
 
 def test_who_may_not_operate_calls_nothing():
@@ -62,34 +80,39 @@ def test_who_may_not_operate_calls_nothing():
     assert len(visit.called) == 1
 
 
-def test_who_operates_is_logged():
-    visit = Visit("anna", True)
+@pytest.mark.parametrize(
+    ("name", "logged"), [("anna", ["anna calls /fv\\x1b_101/identifier/identify"]), ("", [])]
+)
+def test_who_operates_with_an_account_is_logged(name, logged):
+    visit = Visit(name, True)
     assert visit.press() == (True, "done")
     assert visit.called == [("/fv\x1b_101/identifier", ServiceRequest("identify"))]
-    assert visit.logged == ["anna calls /fv\\x1b_101/identifier/identify"]
+    assert visit.logged == logged
 
 
-def test_without_accounts_nobody_is_logged():
-    visit = Visit("", True)
-    assert visit.press().success
-    assert visit.logged == []
-
-
-def test_an_alarm_is_answered_in_the_file_under_the_name_of_the_account(tmp_path):
-    """The record has who, when and what; a valve that the file does not keep is called."""
-    file, valve = HistoryFile(tmp_path / "history.sqlite"), KeptValve("/fv_1/identifier", "FV-1")
+@pytest.fixture
+def file(tmp_path):
+    """A history with one alarm."""
+    made = HistoryFile(tmp_path / "history.sqlite")
     shown = Condition(Level.ERROR, StatusSignal.FAILURE, "excess friction")
-    begin = time.time_ns()
-    follow_alarms(file, valve, {AlarmKind.FRICTION_HIGH: shown}, begin)
-    cache, visit = HistoryCache(file.path), Visit("anna", False)
-    cache.refresh()
-    guarded = GuardedOperator(HistoryOperator(cache, visit), visit, visit.logged.append)
-    request = request_of(Asked(AlarmAction.ACKNOWLEDGE, "bo", "on Monday"), "friction_high")
+    follow_alarms(made, VALVE, {AlarmKind.FRICTION_HIGH: shown}, time.time_ns())
+    return made
 
-    assert not asyncio.run(guarded.call(valve.name, request)).success
+
+VALVE = KeptValve("/fv_1/identifier", "FV-1")
+STRANGER = "/fv_2/identifier"
+
+
+def test_an_alarm_is_answered_in_the_file_under_the_name_of_the_account(file):
+    """The record has who, when and what; a valve that the file does not keep is called."""
+    begin, cache = time.time_ns(), HistoryCache(file.path)
+    cache.refresh()
+    visit = Visit("anna", False, cache)
+
+    assert not visit.acknowledge(VALVE.name, "on Monday").success
     assert len(alarm_events(file, AlarmFilter())) == 1
     visit.may = True
-    answer = asyncio.run(guarded.call(valve.name, request))
+    answer = visit.acknowledge(VALVE.name, "on Monday")
     assert answer == (True, "friction high: acknowledged")
     newest = alarm_events(file, AlarmFilter())[0].event
     assert (newest.action, newest.who, newest.text) == (
@@ -100,25 +123,52 @@ def test_an_alarm_is_answered_in_the_file_under_the_name_of_the_account(tmp_path
     assert begin <= newest.time <= time.time_ns()
     assert visit.logged == ["anna calls /fv_1/identifier/acknowledge"]
     assert visit.called == []
-    asyncio.run(guarded.call("/fv_2/identifier", request))
-    assert [node for node, _ in visit.called] == ["/fv_2/identifier"]
+    visit.acknowledge(STRANGER, "on Monday")
+    values = {"alarm_kind": "friction_high", "alarm_who": "anna", "alarm_text": "on Monday"}
+    assert visit.called == [(STRANGER, ServiceRequest("acknowledge", values))]
 
 
-def test_an_alarm_on_a_server_is_answered_there_where_no_identifier_is_heard(tmp_path, database):
-    file, valve = HistoryFile(tmp_path / "history.sqlite"), KeptValve("/fv_1/identifier", "FV-1")
-    shown = Condition(Level.ERROR, StatusSignal.FAILURE, "excess friction")
-    follow_alarms(file, valve, {AlarmKind.FRICTION_HIGH: shown}, time.time_ns())
+def test_all_alarms_of_a_valve_are_taken_out_of_service_for_some_hours():
+    visit = Visit("", True, HistoryCache(None))
+    request = AlarmRequest(AlarmAction.TAKE_OUT, "bo", duration=2.5 * 3600)
+    visit.run(visit.context.answer_alarm(VALVE.name, None, request))
+    values = {"alarm_kind": "all", "alarm_who": "bo", "alarm_text": "", "alarm_hours": 2.5}
+    assert visit.called == [(VALVE.name, ServiceRequest("out_of_service", values, True))]
+
+
+def test_an_alarm_on_a_server_is_answered_there_where_no_identifier_is_heard(file, database):
     copied(file.path, database)
-    cache, visit = HistoryCache(database), Visit("anna", True)
+    cache = HistoryCache(database)
     cache._refresh()
-    request = request_of(Asked(AlarmAction.ACKNOWLEDGE, "bo"), "friction_high")
+    live, kept = Visit("", True, cache), Visit("", True, cache, is_live=False)
 
-    asyncio.run(HistoryOperator(cache, visit).call(valve.name, request))
-    assert [node for node, _ in visit.called] == [valve.name]
-    answer = asyncio.run(HistoryOperator(cache).call(valve.name, request))
-    assert answer == (True, "friction high: acknowledged")
+    live.acknowledge(VALVE.name)
+    assert [node for node, _ in live.called] == [VALVE.name]
+    assert kept.acknowledge(STRANGER) == (False, f"{STRANGER}: the history has no such valve")
+    assert not kept.press().success
+    assert kept.acknowledge(VALVE.name) == (True, "friction high: acknowledged")
     newest = alarm_events(History(database), AlarmFilter())[0].event
     assert (newest.action, newest.who) == (AlarmAction.ACKNOWLEDGE, "bo")
+
+
+@pytest.mark.parametrize("is_file", [True, False])
+def test_many_alarms_are_answered_at_once(file, is_file):
+    """In the file, or where it is elsewhere, by the identifiers."""
+    cache = HistoryCache(file.path if is_file else None)
+    visit = Visit("anna", False, cache)
+    alarms = [(VALVE, AlarmKind.FRICTION_HIGH), (VALVE, AlarmKind.FRICTION_LOW)]
+    request = AlarmRequest(AlarmAction.ACKNOWLEDGE, "bo")
+
+    def answer():
+        return visit.run(visit.context.answer_alarms(alarms, request))
+
+    assert not answer().success
+    visit.may = True
+    assert answer() == (True, "1 of 2 alarms acknowledged" if is_file else "2 done")
+    whos = [request.values["alarm_who"] for _, request in visit.called]
+    assert whos == ([] if is_file else ["anna"] * 2)
+    assert len(visit.logged) == len(whos)
+    assert (alarm_events(file, AlarmFilter())[0].event.who == "anna") == is_file
 
 
 NAMED = "fv_101_20260921T141320Z"
@@ -196,7 +246,6 @@ def test_a_name_from_outside_is_printable(files, tmp_path):
     ("changes", "words"),
     [
         ({"port": 0}, "port 0"),
-        ({"silence": 0.0}, "silence"),
         ({"time_zone": "Mars/Olympus"}, "time_zone"),
         ({"time_zone": "../../etc/passwd"}, "time_zone"),
     ],

@@ -9,8 +9,10 @@
 
 """A plant's valves: the store that one thread fills, and their search, filters and order."""
 
+import itertools
 import math
 import threading
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import pytest
@@ -20,7 +22,7 @@ from simulated_plant import hear, values_of_valve
 
 from valve_friction_ros.dashboard import Plant, Selection, Status, Unread, selected
 from valve_friction_ros.dashboard.history_cache import sparkline
-from valve_friction_ros.dashboard.live_state import MOST_VALVES, Heard
+from valve_friction_ros.dashboard.live_state import MOST_VALVES
 from valve_friction_ros.dashboard.plant_rows import (
     SORTS,
     STATES,
@@ -40,12 +42,31 @@ from valve_friction_ros.wording import number_and_width
 DAY = 86_400_000_000_000
 
 
+@pytest.fixture
+def plant():
+    """Nine made-up valves, of each kind one, heard at time 100 s; silent after 5 s."""
+    made = Plant(silence=5.0)
+    for index in range(9):
+        hear(made, Status(*values_of_valve(index)), 100.0)
+    return made
+
+
 def test_a_valve_is_silent_after_a_while(plant):
     assert not any(one.is_silent for one in plant.valves(104.9))
     assert all(one.is_silent for one in plant.valves(105.1))
     hear(plant, Status(*values_of_valve(3)), 105.0)
     silent = [one.view.tag for one in plant.valves(106.0) if not one.is_silent]
     assert silent == ["FV-104"]
+
+
+def hear_named(plant, *names, at, **fields):
+    for name in names:
+        status = Status(f"/{name}/identifier: friction", 0, "", "", {})
+        hear(plant, status._replace(**fields), at)
+
+
+def nodes_of(plant, now):
+    return [one.view.node for one in plant.valves(now)]
 
 
 def test_what_the_history_knows_is_missed():
@@ -60,65 +81,48 @@ def test_what_the_history_knows_is_missed():
 
 def test_names_from_outside_do_not_fill_the_memory():
     plant = Plant(5.0)
-    for index in range(MOST_VALVES + 10):
-        hear(plant, Status(f"/v{index}/identifier: friction", 0, "", "", {}), 0.0)
+    hear_named(plant, *range(MOST_VALVES + 10), at=0.0)
     assert len(plant.valves(0.0)) == MOST_VALVES
-    hear(plant, Status("/v3/identifier: friction", 2, "", "late", {}), 1.0)
-    assert plant.valve("/v3/identifier", 1.0).view.sentence == "late"
+    hear_named(plant, 3, at=1.0, message="late")
+    assert plant.valve("/3/identifier", 1.0).view.sentence == "late"
 
 
 def test_a_name_that_nothing_keeps_is_forgotten():
     plant = Plant(5.0)
     plant.expect([("/kept/identifier", "KEPT")])
-    for name in ("kept", "passing", "late"):
-        hear(plant, Status(f"/{name}/identifier: friction", 0, "", "", {}), 0.0)
-    hear(plant, Status("/late/identifier: friction", 0, "", "", {}), 100.0)
-    assert {one.view.node for one in plant.valves(3599.0)} == {
-        "/kept/identifier", "/passing/identifier", "/late/identifier"
-    }  # fmt: skip
-    assert {one.view.node for one in plant.valves(3690.0)} == {
-        "/kept/identifier", "/late/identifier"
-    }  # fmt: skip
-    hear(plant, Status("/new/identifier: friction", 0, "", "", {}), 3691.0)
+    hear_named(plant, "kept", "passing", "late", at=0.0)
+    hear_named(plant, "late", at=100.0)
+    assert len(plant.valves(3599.0)) == 3
+    assert nodes_of(plant, 3690.0) == ["/kept/identifier", "/late/identifier"]
+    hear_named(plant, "new", at=3691.0)
     numbers = [one.number for one in plant.valves(3691.0)]
     assert len(set(numbers)) == 3  # none takes the number of another
 
 
 def test_room_is_made_though_nobody_looks():
     plant = Plant(5.0)
-    for index in range(MOST_VALVES):
-        hear(plant, Status(f"/v{index}/identifier: friction", 0, "", "", {}), 0.0)
-    hear(plant, Status("/new/identifier: friction", 0, "", "", {}), 4000.0)
-    assert [one.view.node for one in plant.valves(4000.0)] == ["/new/identifier"]
+    hear_named(plant, *range(MOST_VALVES), at=0.0)
+    hear_named(plant, "new", at=4000.0)
+    assert nodes_of(plant, 4000.0) == ["/new/identifier"]
 
 
 def test_it_is_filled_while_it_is_drained():
     """Trap: a collection that changes while it is walked through."""
-    plant, stop, failures = Plant(5.0), threading.Event(), []
+    plant, stop = Plant(5.0), threading.Event()
 
     def fill():
-        index = 0
-        while not stop.is_set():
-            hear(plant, Status(f"/v{index % 3000}/identifier: friction", 0, "", "", {}), 0.0)
-            index += 1
+        for index in itertools.cycle(range(3000)):
+            hear_named(plant, index, at=0.0)
+            if stop.is_set():
+                return
 
-    def drain():
+    with ThreadPoolExecutor() as pool:
+        pool.submit(fill)
+        drains = [pool.submit(lambda: [plant.valves(0.0) for _ in range(30)]) for _ in range(2)]
         try:
-            for _ in range(30):
-                plant.valves(0.0)
-        except RuntimeError as error:
-            failures.append(error)
-
-    filling = threading.Thread(target=fill)
-    filling.start()
-    drains = [threading.Thread(target=drain) for _ in range(2)]
-    for one in drains:
-        one.start()
-    for one in drains:
-        one.join()
-    stop.set()
-    filling.join()
-    assert not failures
+            assert all(one.result() for one in drains)
+        finally:
+            stop.set()
 
 
 def news(plant, feed, now, wall=1000.0):
@@ -227,30 +231,26 @@ def valve(**changes):
     plant = Plant(5.0)
     hear(plant, Status(name, level, tag, message, {**values, **changes}), 0.0)
     (heard,) = plant.valves(0.0)
-    return row_of(heard, None, 0.0, ""), heard.view
+    return row_of(heard, None, 0.0, ""), heard
 
 
 def test_a_friction_that_the_record_does_not_determine_is_no_number():
-    row, view = valve()
+    row, _ = valve()
     assert row["fcof"] == "F_c"
     assert row["dead"] != "–"
     open_ = {"coulomb_friction verdict": "not identifiable", "dead_band [%]": "nan"}
-    row, view = valve(**open_)
-    assert (row["fcof"], row["fc"]) == ("sliding", quantity_texts(view.friction)[0])
-    assert view.friction.name == "sliding_friction"
+    row, heard = valve(**open_)
+    assert (row["fcof"], row["fc"]) == ("sliding", quantity_texts(heard.view.friction)[0])
+    assert heard.view.friction.name == "sliding_friction"
     assert (row["dead"], row["deadw"]) == ("–", "")
-    row, view = valve(**open_, **{"sliding_friction verdict": "not identifiable"})
+    row, heard = valve(**open_, **{"sliding_friction verdict": "not identifiable"})
     assert (row["fc"], row["fcw"], row["fcof"]) == ("–", "", "")
-    assert SORTS["friction"](plant_of(view))[0] == math.inf
-
-
-def plant_of(view):
-    return Heard(0, view, 0.0, False)
+    assert SORTS["friction"](heard)[0] == math.inf
 
 
 def test_frictions_are_sorted_by_what_is_shown():
     _, sliding = valve(**{"coulomb_friction [N]": "nan", "sliding_friction [N]": "512"})
-    assert SORTS["friction"](plant_of(sliding))[0] == -512
+    assert SORTS["friction"](sliding)[0] == -512
 
 
 def test_a_sparkline_grows_upwards():
@@ -299,7 +299,7 @@ def test_what_only_the_history_knows_comes_last(plant):
     plant.expect([("/x/identifier", "X")])
     assert tags(plant)[-1] == "X"
     assert tags(plant, Selection(states=frozenset({"unheard"}))) == ["X"]
-    hear(plant, Status("/x/identifier: friction", 0, "X", "", {}), NOW)
+    hear_named(plant, "x", at=NOW)
     assert state_of(plant.valve("/x/identifier", NOW + 30.0)) == "silent"
 
 
@@ -328,18 +328,21 @@ def test_a_silent_valve_comes_after_errors_and_before_warnings(plant):
     assert order[2] == "FV-109"  # of the silent ones the one that was in WARN
 
 
-def test_search_needs_all_words_in_any_case(plant):
-    assert tags(plant, Selection(search="GROWN packing")) == ["FV-105"]
-    assert tags(plant, Selection(search="fv-103")) == ["FV-103"]
-    assert tags(plant, Selection(search="/area_1/fv_103")) == ["FV-103"]
-    assert tags(plant, Selection(search="fv-103 leak")) == []
-
-
-def test_filters(plant):
-    assert set(tags(plant, Selection(states=frozenset({"error"})))) == {"FV-106", "FV-107"}
-    assert tags(plant, Selection(signals=frozenset({"S"}))) == ["FV-107"]
-    assert tags(plant, Selection(states=frozenset({"warn"}), signals=frozenset({"S"}))) == []
-    assert tags(plant, Selection(states=frozenset({"silent"})), now=200.0) == tags(plant, now=200.0)
+@pytest.mark.parametrize(
+    ("chosen", "shown"),
+    [
+        ({"search": "GROWN packing"}, {"FV-105"}),  # all words, in any case
+        ({"search": "fv-103"}, {"FV-103"}),
+        ({"search": "/area_1/fv_103"}, {"FV-103"}),
+        ({"search": "fv-103 leak"}, set()),
+        ({"states": frozenset({"error"})}, {"FV-106", "FV-107"}),
+        ({"states": frozenset({"silent"})}, set()),
+        ({"signals": frozenset({"S"})}, {"FV-107"}),
+        ({"states": frozenset({"warn"}), "signals": frozenset({"S"})}, set()),
+    ],
+)
+def test_search_and_filters(plant, chosen, shown):
+    assert set(tags(plant, Selection(**chosen))) == shown
 
 
 @pytest.mark.parametrize("name", SORTS)

@@ -201,9 +201,12 @@ def test_today_is_marked_where_it_is_near(history, days_after, is_marked):
         assert low < now / DAY < high
 
 
-def test_all_valves_have_one_time_axis(history):
+def test_all_valves_have_one_time_axis_and_one_legend(history):
     later = success(START + 300 * DAY, valve=OTHER)
-    panels = trend_figure([history, ValveHistory(OTHER, (later,), None, None)]).axes
+    figure = trend_figure([history, ValveHistory(OTHER, (later,), None, None)])
+    (legend,), panels = figure.legends, figure.axes
+    labels = [text.get_text() for text in legend.get_texts()]
+    assert len(labels) == len(set(labels))
     assert len({axes.get_xlim() for axes in panels}) == 1
     assert [bool(axes.get_xlabel()) for axes in panels] == [False, True]
     assert panels[1].get_xlabel().endswith("identified from 2026-09-21 to 2027-07-18")
@@ -221,14 +224,6 @@ def test_a_report_has_the_same_panel_without_title(history, is_narrow):
     shown = [one for one in labels if box.x0 <= one.x0 and one.x1 <= box.x1]
     assert len(shown) >= 2
     assert all(one.x1 < other.x0 for one, other in pairwise(shown))
-
-
-def test_one_panel_a_valve_and_one_legend(history):
-    figure = trend_figure([history] * 3)
-    assert len(figure.axes) == 3
-    (legend,) = figure.legends
-    labels = [text.get_text() for text in legend.get_texts()]
-    assert len(labels) == len(set(labels))
 
 
 TIMES = (1, 3, *[0] * (BINS - 3), 4)

@@ -418,6 +418,7 @@ def test_an_alarm_is_acknowledged_with_a_name_and_exported(identified, tab):
     row = page.locator("tr", has_text="friction high")
     row.wait_for()
     assert "Replace the packing" in row.inner_text()
+    assert not page.get_by_text("No current alarms.").count()
     row.get_by_role("button", name="Acknowledge").click()
     page.get_by_role("button", name="Confirm").click()
     page.get_by_text("who is empty").wait_for()

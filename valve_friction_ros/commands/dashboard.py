@@ -17,13 +17,7 @@ from pathlib import Path
 from valve_friction_ros.commands.process import ExitCode, requests_raise
 from valve_friction_ros.dashboard import DashboardOptions, Plant
 from valve_friction_ros.dashboard.accounts import Access, accounts_from
-from valve_friction_ros.dashboard.alarm_list import HistoryOperator
-from valve_friction_ros.dashboard.context import (
-    INSTALL,
-    DashboardContext,
-    GuardedOperator,
-    NoSignals,
-)
+from valve_friction_ros.dashboard.context import INSTALL, DashboardContext
 from valve_friction_ros.dashboard.history_cache import KeptValves
 from valve_friction_ros.history import HistoryError
 
@@ -59,10 +53,7 @@ def run(options: argparse.Namespace) -> int:
     history = KeptValves(place, plant)
     history.valve("")  # refuses a file that is not a history
     visitors = server.guarded(access, _log)
-    operator = GuardedOperator(HistoryOperator(history), visitors, _log)
-    context = DashboardContext(
-        shown, plant, history, operator, NoSignals(), visitors, is_live=False
-    )
+    context = DashboardContext(shown, plant, history, visitors, _log)
     requests_raise()
     with contextlib.suppress(KeyboardInterrupt):
         server.serve(

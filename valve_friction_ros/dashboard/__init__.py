@@ -20,17 +20,13 @@ if TYPE_CHECKING:
     from valve_friction_ros.dashboard.context import (
         Answer as Answer,
         DashboardOptions as DashboardOptions,
-        Operator as Operator,
         ServiceRequest as ServiceRequest,
-        Signals as Signals,
-        Visitors as Visitors,
     )
     from valve_friction_ros.dashboard.live_state import (
         ESSENTIAL_KEYS as ESSENTIAL_KEYS,
         Plant as Plant,
         Status as Status,
         Unread as Unread,
-        ValveView as ValveView,
         view_of as view_of,
     )
     from valve_friction_ros.dashboard.plant_rows import (

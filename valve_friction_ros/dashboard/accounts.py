@@ -25,7 +25,7 @@ import secrets
 import ssl
 import unicodedata
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
 
@@ -107,11 +107,9 @@ class HashedPassword:
         return cls(_COST, _BLOCK, _PARALLEL, salt, empty._hashed(password))
 
     @classmethod
-    def unknown(cls, like: "HashedPassword | None" = None) -> "HashedPassword":
-        """Return a hash that matches no password, at the cost of `like` or of a new hash."""
+    def unknown(cls) -> "HashedPassword":
+        """Return a hash that matches no password."""
         salt, digest = secrets.token_bytes(_SALT), secrets.token_bytes(_DIGEST)
-        if like is not None:
-            return replace(like, salt=salt, digest=digest)
         return cls(_COST, _BLOCK, _PARALLEL, salt, digest)
 
     @classmethod
@@ -318,17 +316,10 @@ class Access:
         return ""
 
     def answers_to(self, called: str, address: str) -> bool:
-        """Return whether a request uses one of the dashboard's own host names.
-
-        Parameters
-        ----------
-        called : str
-            Host named by the browser: the header ``Host`` without the port.
-        address : str
-            Local address of the connection.
+        """Return whether `called`, the host in the header ``Host``, is the dashboard's own.
 
         A foreign page whose name resolves to this host sends its own name in that header (DNS
-        rebinding). The local address itself needs no name and is always accepted.
+        rebinding). The local address of the connection needs no name and is always accepted.
         """
         name = called.lower().rstrip(".")
         known = {"localhost", self.host.lower(), *(each.lower() for each in self.host_names)}

@@ -11,21 +11,33 @@
 
 import asyncio
 import contextlib
+import math
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+import time
+from collections import defaultdict
+from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 
 from valve_friction_ros.dashboard.accounts import Access
 from valve_friction_ros.dashboard.history_cache import HistoryCache
 from valve_friction_ros.dashboard.live_state import Plant
 from valve_friction_ros.dashboard.live_strip import LiveStrip
-from valve_friction_ros.health import AlarmKind, AlarmRequest
-from valve_friction_ros.history import HistoryError, KeptValve, Place
+from valve_friction_ros.health import AlarmAction, AlarmError, AlarmKind, AlarmRequest
+from valve_friction_ros.history import (
+    HistoryError,
+    KeptValve,
+    Place,
+    request_alarms,
+    request_many,
+)
 from valve_friction_ros.outside_text import printable
+
+if TYPE_CHECKING:
+    from valve_friction_ros.dashboard.gate import Guard
 
 INSTALL = "pip install 'nicegui>=3.18,<4'"
 """Command that installs the web framework, which rosdep does not know."""
@@ -63,7 +75,7 @@ class DashboardOptions:
     Raises
     ------
     ValueError
-        If port or silence is impossible, or the zone unknown.
+        If the port is impossible, or the zone unknown.
     """
 
     access: Access = field(default_factory=Access)
@@ -79,8 +91,6 @@ class DashboardOptions:
         """Refuse impossible options."""
         if not 0 < self.port < 65536:
             raise ValueError(f"port {self.port} is impossible: give one from 1 to 65535")
-        if not self.silence > 0:
-            raise ValueError(f"silence must be above 0 s, got {self.silence:g}")
         zone_of(self.time_zone)
 
     @property
@@ -116,15 +126,8 @@ class ServiceRequest(NamedTuple):
     switch: bool | None = None
 
 
-class Operator(Protocol):
-    """Calls the services of identifiers."""
-
-    async def call(self, node: str, request: ServiceRequest) -> Answer:
-        """Call a service of an identifier and wait for its answer.
-
-        If the identifier cannot be reached, return an unsuccessful answer that says so.
-        """
-        ...
+Services = Callable[[str, ServiceRequest], Awaitable[Answer]]
+"""Calls a service of an identifier; if it cannot be reached, the unsuccessful answer says so."""
 
 
 class Signals(Protocol):
@@ -139,69 +142,24 @@ class Signals(Protocol):
         ...
 
 
-class NoSignals:
-    """Signals of a dashboard without ROS: none arrive."""
-
-    def watch(self, _node: str) -> LiveStrip:
-        """Return an empty strip."""
-        return LiveStrip(60.0)
-
-    def unwatch(self, _node: str) -> None:
-        """Do nothing."""
-
-
-class Visitors(Protocol):
-    """Knows the visitor of the page whose code is running."""
-
-    def name(self) -> str:
-        """Return the name of the visitor's account; empty if no account is needed."""
-        ...
-
-    def may_operate(self) -> bool:
-        """Return whether the visitor may call services now."""
-        ...
-
-    def log_out(self) -> None:
-        """End the visitor's session."""
-        ...
-
-
-NOT_ALLOWED = "your account may not operate: log in with one that may"
-
-
-class GuardedOperator:
-    """Calls services only for a visitor with permission to operate at that moment.
-
-    Parameters
-    ----------
-    operator : Operator
-        Calls the services.
-    visitors : Visitors
-        Knows the visitor.
-    log : callable
-        Takes a line for each call by a visitor with an account.
-    """
-
-    def __init__(self, operator: Operator, visitors: Visitors, log: Callable[[str], None]) -> None:
-        self._operator, self._visitors, self._log = operator, visitors, log
-
-    async def call(self, node: str, request: ServiceRequest) -> Answer:
-        """Call a service of an identifier, or return a refusal without permission.
-
-        A request on an alarm carries the name of the logged-in account, whatever the page says.
-        """
-        if not self._visitors.may_operate():
-            return Answer(False, NOT_ALLOWED)
-        if name := self._visitors.name():
-            self._log(f"{name} calls {printable(node)}/{printable(request.name)}")
-            if "alarm_who" in request.values:
-                request = request._replace(values={**request.values, "alarm_who": name})
-        return await self._operator.call(node, request)
+_NOT_ALLOWED = Answer(False, "your account may not operate: log in with one that may")
+_NOTHING_HEARD = "this dashboard shows only a history: there is no identifier to ask"
+_ALARM_SERVICES = {
+    AlarmAction.ACKNOWLEDGE: ("acknowledge", None),
+    AlarmAction.SHELVE: ("shelve", None),
+    AlarmAction.UNSHELVE: ("unshelve", None),
+    AlarmAction.COMMENT: ("comment", None),
+    AlarmAction.TAKE_OUT: ("out_of_service", True),
+    AlarmAction.PUT_BACK: ("out_of_service", False),
+}
 
 
 @dataclass(frozen=True)
 class DashboardContext:
     """Data sources and services of a dashboard.
+
+    A request needs permission at that moment. One on an alarm carries the name of the logged-in
+    account, whatever the page says.
 
     Attributes
     ----------
@@ -211,36 +169,117 @@ class DashboardContext:
         Live state of the valves.
     history : HistoryCache
         History of the valves.
-    operator : Operator
-        Calls the services of identifiers.
-    signals : Signals
-        Receives the signals of valves.
-    visitors : Visitors
+    visitors : Guard
         Knows the visitor and the visitor's permission.
-    is_live : bool
-        Whether identifiers are heard and can be called; else there is only the history.
+    log : callable
+        Takes a line for each call by a visitor with an account.
+    services : callable or None
+        Calls the services of identifiers; None if none is heard and there is only the history.
+    signals : Signals or None
+        Receives the signals of valves.
     """
 
     options: DashboardOptions
     plant: Plant
     history: HistoryCache
-    operator: Operator
-    signals: Signals
-    visitors: Visitors
-    is_live: bool = True
+    visitors: "Guard"
+    log: Callable[[str], None]
+    services: Services | None = None
+    signals: Signals | None = None
+
+    @property
+    def is_live(self) -> bool:
+        """Whether identifiers are heard and can be called; else there is only the history."""
+        return self.services is not None
+
+    def _may_call(self, node: str, service: str) -> bool:
+        """Return whether the visitor may call a service now, and log who calls it."""
+        if not self.visitors.may_operate():
+            return False
+        if name := self.visitors.name():
+            self.log(f"{name} calls {printable(node)}/{printable(service)}")
+        return True
+
+    async def call(self, node: str, service: str) -> Answer:
+        """Call a service of an identifier, or return a refusal."""
+        if not self._may_call(node, service):
+            return _NOT_ALLOWED
+        if self.services is None:
+            return Answer(False, _NOTHING_HEARD)
+        return await self.services(node, ServiceRequest(service))
+
+    async def answer_alarm(
+        self, node: str, kind: AlarmKind | None, request: AlarmRequest
+    ) -> Answer:
+        """Make a request on one alarm of a valve, or on all.
+
+        It goes through a history file that holds the valve, because an identifier that shares its
+        process with many valves offers no alarm services, but follows that file. Without such a
+        file it goes through the identifier, or, if none is heard, through the history on a server.
+        """
+        if not self._may_call(node, _ALARM_SERVICES[request.action][0]):
+            return _NOT_ALLOWED
+        return await self._answer(node, kind, self._signed(request))
+
+    async def _answer(self, node: str, kind: AlarmKind | None, request: AlarmRequest) -> Answer:
+        name, switch = _ALARM_SERVICES[request.action]
+        file = self.history.file
+        kept = next((one for one in self.history.valves if one.name == node), None)
+        if self.services is not None and (kept is None or not self.history.is_file):
+            values: dict[str, object] = {
+                "alarm_kind": "all" if kind is None else kind.value,
+                "alarm_who": request.who,
+                "alarm_text": request.text,
+            }
+            if math.isfinite(request.duration):
+                values["alarm_hours"] = request.duration / 3600
+            return await self.services(node, ServiceRequest(name, values, switch))
+        if file is None or kept is None:
+            return Answer(False, f"{node}: the history has no such valve")
+        now = time.time_ns()
+        try:
+            steps = await asyncio.to_thread(request_alarms, file, kept, kind, request, now)
+        except (AlarmError, HistoryError) as error:
+            return Answer(False, str(error))
+        return Answer(True, "; ".join(str(one.alarm) for one in steps.events))
 
     async def answer_alarms(
         self, alarms: Sequence[tuple[KeptValve, AlarmKind]], request: AlarmRequest
     ) -> Answer:
-        """Make a request on many alarms at once, through the history."""
+        """Make a request on many alarms at once, through the history or the identifiers."""
         if not self.visitors.may_operate():
-            return Answer(False, NOT_ALLOWED)
-        name = self.visitors.name() or request.who
+            return _NOT_ALLOWED
+        file, now, signed = self.history.file, time.time_ns(), self._signed(request)
+        if file is None or (self.services is not None and not self.history.is_file):
+            return await self._answer_each(alarms, signed)
         try:
-            count = await asyncio.to_thread(self.history.answer, alarms, replace(request, who=name))
+            count = await asyncio.to_thread(request_many, file, alarms, signed, now)
         except HistoryError as error:
             return Answer(False, str(error))
         return Answer(count > 0, f"{count} of {len(alarms)} alarms {request.action.value}")
+
+    async def _answer_each(
+        self, alarms: Sequence[tuple[KeptValve, AlarmKind]], request: AlarmRequest
+    ) -> Answer:
+        """Make a request for each alarm: valves in parallel, alarms of one valve in turn."""
+        by_valve: defaultdict[str, list[AlarmKind]] = defaultdict(list)
+        for valve, kind in alarms:
+            # Only here, not in the tasks below, is the visitor known.
+            if not self._may_call(valve.name, _ALARM_SERVICES[request.action][0]):
+                return _NOT_ALLOWED
+            by_valve[valve.name].append(kind)
+
+        async def of_valve(node: str, kinds: list[AlarmKind]) -> list[Answer]:
+            return [await self._answer(node, kind, request) for kind in kinds]
+
+        found = await asyncio.gather(*(of_valve(*each) for each in by_valve.items()))
+        wrong = [one.message for some in found for one in some if not one.success]
+        if wrong:
+            return Answer(False, f"{len(wrong)} of {len(alarms)} refused: {wrong[0]}")
+        return Answer(True, f"{len(alarms)} done")
+
+    def _signed(self, request: AlarmRequest) -> AlarmRequest:
+        return replace(request, who=self.visitors.name() or request.who)
 
 
 _ENDINGS = (".html", ".mcap", ".db3", ".yaml")
@@ -264,13 +303,7 @@ def _stem(namespace: str) -> str:
 
 @dataclass(frozen=True)
 class ValveFiles:
-    """The folders of reports, bags and alarms.
-
-    Attributes
-    ----------
-    folders : mapping of str to Path
-        The folders by their names in addresses.
-    """
+    """The folders of reports, bags and alarms, by their names in addresses."""
 
     folders: Mapping[str, Path]
 

@@ -16,7 +16,6 @@ time, and one client cannot take all connections.
 
 import asyncio
 import time
-from collections import Counter
 from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
@@ -30,7 +29,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
 from valve_friction_ros.dashboard.accounts import Access, Account, Role
-from valve_friction_ros.dashboard.log_in import AttemptLimit, LogIn, Refusal, Sessions, network_of
+from valve_friction_ros.dashboard.log_in import LogIn, Sessions, limited, network_of
 from valve_friction_ros.outside_text import page_environment, printable
 
 _BASE = {
@@ -105,51 +104,13 @@ MOST_OF_A_CLIENT = 256
 one to keep it, so 30 visitors behind one proxy can open pages at once; the usual limit of a process
 is 1024 open files."""
 
-_SUMMARY = 60.0
-"""Time between two log lines on ended connections, s."""
-
-
-class ConnectionLog:
-    """Logs ended connections: the first at once, then a total every minute.
-
-    Parameters
-    ----------
-    log : callable
-        Takes a line.
-    """
-
-    def __init__(self, log: Callable[[str], None]) -> None:
-        self._log = log
-        self._more: Counter[tuple[str, str]] | None = None
-
-    def note(self, client: str, why: str) -> None:
-        """Count an ended connection of a client."""
-        if self._more is not None:
-            self._more[client, why] += 1
-            return
-        self._tell(f"a connection of {printable(client)} was ended: {why}")
-
-    def _tell(self, line: str) -> None:
-        self._log(line)
-        self._more = Counter()
-        asyncio.get_running_loop().call_later(_SUMMARY, self._sum_up)
-
-    def _sum_up(self) -> None:
-        more, self._more = self._more, None
-        if more:
-            ((client, why), _), count = more.most_common(1)[0], more.total()
-            self._tell(
-                f"{count} more connections were ended in {_SUMMARY:g} s, most of "
-                f"{printable(client)}: {why}"
-            )
-
 
 class _Bounded(HttpToolsProtocol):
     """uvicorn's protocol with a timeout per request and a connection limit per client."""
 
-    def __init__(self, *arguments: Any, ended: ConnectionLog, **named: Any) -> None:
+    def __init__(self, *arguments: Any, log: Callable[[str], None], **named: Any) -> None:
         super().__init__(*arguments, **named)
-        self._ended = ended
+        self._log = log
         self._network = ""
         self._due: asyncio.TimerHandle | None = None
         self._has_begun = False
@@ -177,7 +138,7 @@ class _Bounded(HttpToolsProtocol):
     def end(self, why: str) -> None:
         """End the connection at once, and log the reason."""
         self._has_arrived()
-        self._ended.note(self._network, why)
+        self._log(f"a connection of {printable(self._network)} was ended: {why}")
         self.connections.discard(self)
         self.transport.abort()
 
@@ -219,8 +180,6 @@ STATE = "/login/state"
 
 _LONGEST_FORM = 4096
 _LONGEST_NAME = 64
-_MOST_LINES = 60
-"""Maximum number of refused log-ins logged per minute."""
 _PATIENCE = 10.0
 """Timeout for a form to arrive, s."""
 
@@ -239,16 +198,7 @@ def token_of(asked: HTTPConnection, access: Access) -> str | None:
 class Gate:
     """An ASGI application that lets only authorised requests through to another.
 
-    Parameters
-    ----------
-    app : ASGI application
-        The pages.
-    access : Access
-        Access control.
-    sessions : Sessions
-        The sessions.
-    log : callable
-        Takes a line for each log-in and each refused one; at most 60 refusals per minute.
+    `log` takes a line for each log-in, and for refused ones at a limited rate.
     """
 
     def __init__(
@@ -256,7 +206,7 @@ class Gate:
     ) -> None:
         self._app, self._access, self._sessions, self._log = app, access, sessions, log
         self._log_in = LogIn(access, sessions)
-        self._lines = AttemptLimit(_MOST_LINES, 60.0, time.monotonic)
+        self._log_refusal = limited(log)
         self._page = page_environment("valve_friction_ros.dashboard").get_template("log_in.html")
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -320,8 +270,8 @@ class Gate:
         address = request.client.host if request.client else ""
         name = fields.get("name", "")
         found = await self._log_in.attempt(name, fields.get("password", ""), address)
-        if isinstance(found, Refusal):
-            return self._refused(name, address, there, found.wait)
+        if isinstance(found, int):
+            return self._refused(name, address, there, found)
         self._log(f"{printable(name)} has logged in from {printable(address)}")
         self._sessions.end(token_of(request, self._access))  # any earlier session of this browser
         response = RedirectResponse(there, 303, OF_LOG_IN)
@@ -336,12 +286,10 @@ class Gate:
         return response
 
     def _refused(self, name: str, address: str, there: str, wait: int) -> Response:
-        """Refuse a log-in, and log it at a limited rate, since attempts may never end."""
-        if self._lines.wait("") <= 0:
-            self._lines.count("")
-            why = "too many attempts" if wait > 0 else "wrong name or password"
-            shown = printable(name, _LONGEST_NAME)
-            self._log(f"refused log-in of {shown!r} from {printable(address)}: {why}")
+        """Refuse a log-in."""
+        why = "too many attempts" if wait > 0 else "wrong name or password"
+        shown = printable(name, _LONGEST_NAME)
+        self._log_refusal(f"refused log-in of {shown!r} from {printable(address)}: {why}")
         if wait <= 0:
             return self._form(there, "Wrong name or password.", 401)
         page = self._form(there, f"Too many attempts: try again in {-(-wait // 60)} min.", 429)
@@ -397,15 +345,7 @@ Without it NiceGUI's page would try to reconnect for ever."""
 
 
 class Guard:
-    """Identifies the visitor in a page and in its handlers.
-
-    Parameters
-    ----------
-    access : Access
-        Access control.
-    sessions : Sessions
-        The sessions.
-    """
+    """Identifies the visitor in a page and in its handlers."""
 
     def __init__(self, access: Access, sessions: Sessions) -> None:
         self._access, self._sessions = access, sessions
@@ -443,12 +383,8 @@ class Guard:
 def guard(app: App, access: Access, log: Callable[[str], None]) -> Guard:
     """Put the gate before an application; call this once, before the application runs.
 
-    `log` takes a line for each log-in and each refused one.
-
-    Raises
-    ------
-    ValueError, OSError
-        If the session file cannot be used.
+    `log` takes a line for each log-in and each refused one. Raises ValueError or OSError if the
+    session file cannot be used.
     """
     sessions = Sessions(
         access.accounts, access.session_hours * 3600.0, time.time, access.session_file, log
@@ -469,14 +405,14 @@ def guard(app: App, access: Access, log: Callable[[str], None]) -> Guard:
 def server_options(access: Access, log: Callable[[str], None]) -> dict[str, Any]:
     """Return the access options for `ui.run`.
 
-    `log` takes the lines on ended connections.
+    `log` takes the lines on ended connections, at a limited rate.
     """
     options: dict[str, Any] = {
         "host": access.host,
         # With proxy headers a request could forge its address, by which attempts are counted.
         "proxy_headers": False,
         "server_header": False,
-        "http": partial(_Bounded, ended=ConnectionLog(log)),
+        "http": partial(_Bounded, log=limited(log)),
     }
     if access.certificate is not None and access.key is not None:
         options |= {"ssl_certfile": str(access.certificate), "ssl_keyfile": str(access.key)}

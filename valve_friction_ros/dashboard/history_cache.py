@@ -27,7 +27,6 @@ from valve_friction_ros.dashboard.live_state import Plant, Status, Unread
 from valve_friction_ros.health import (
     Alarm,
     AlarmKind,
-    AlarmRequest,
     Level,
     StatusSignal,
     Survey,
@@ -116,16 +115,12 @@ class HistoryCache:
 
     `refresh` and `valve` read the file, so call them in a worker thread; the cached contents are
     available at once. A read error becomes the `problem`, and earlier contents remain. A server may
-    be slow: `refresh` queries it in another thread and does not wait.
-
-    Parameters
-    ----------
-    place : Path or HistoryServer or None
-        The history; None without a history.
+    be slow: `refresh` queries it in another thread and does not wait. Without a place there is no
+    history, and no `file`.
     """
 
     def __init__(self, place: Place | None) -> None:
-        self._file = None if place is None else database.History(place)
+        self.file = None if place is None else database.History(place)
         self._path = place if isinstance(place, Path) else None  # None: nothing, or a server
         self._asking: threading.Thread | None = None
         self._asked = -_SERVER_PAUSE
@@ -150,7 +145,7 @@ class HistoryCache:
 
         For a server, start a query; its answer arrives later.
         """
-        if self._file is None or self._path is not None:
+        if self.file is None or self._path is not None:
             return self._refresh()
         is_asking = self._asking is not None and self._asking.is_alive()
         if not is_asking and time.monotonic() - self._asked >= _SERVER_PAUSE:
@@ -161,19 +156,19 @@ class HistoryCache:
 
     def _refresh(self) -> bool:
         with self._lock:
-            if self._file is None or not self._may_be_new():
+            if self.file is None or not self._may_be_new():
                 return False
             since = time.time_ns() - _SPARK_DAYS * DAY
             try:
-                mark = database.history_mark(self._file)
+                mark = database.history_mark(self.file)
                 if self._mark is None or mark.alarm_event != self._mark.alarm_event:
                     self.alarm_revision += 1
                 if self._mark is not None and mark.database != self._mark.database:
                     self._begin_anew()
                 if mark == self._mark and mark.settled and self.problem is None:
                     return False
-                valves = self._file.valves()
-                found = database.ratios_after(self._file, self._row, since)
+                valves = self.file.valves()
+                found = database.ratios_after(self.file, self._row, since)
             except HistoryError as error:
                 is_new, self.problem = str(error) != self.problem, str(error)
                 self.revision += is_new
@@ -219,38 +214,16 @@ class HistoryCache:
 
         Raises HistoryError if the history cannot be read.
         """
-        if self._file is None:
+        if self.file is None:
             return ()
         if is_journal:
-            return database.alarm_events(self._file, chosen, most)
-        return database.standing_alarms(self._file, chosen, most)
+            return database.alarm_events(self.file, chosen, most)
+        return database.standing_alarms(self.file, chosen, most)
 
     @property
     def is_file(self) -> bool:
         """Whether the history is a file, which identifiers on this machine follow."""
         return self._path is not None
-
-    def answer(self, alarms: Sequence[tuple[KeptValve, AlarmKind]], request: AlarmRequest) -> int:
-        """Make a request on many alarms; return the number of alarms that accepted it.
-
-        Raises HistoryError if there is no history or it cannot be written.
-        """
-        return database.request_many(self._written(), alarms, request, time.time_ns())
-
-    def answer_valve(
-        self, valve: KeptValve, kind: AlarmKind | None, request: AlarmRequest
-    ) -> tuple[Alarm, ...]:
-        """Make a request on one alarm or all alarms of a valve; return the updated alarms.
-
-        Raises AlarmError if the request is not possible now, and HistoryError like `answer`.
-        """
-        steps = database.request_alarms(self._written(), valve, kind, request, time.time_ns())
-        return tuple(one.alarm for one in steps.events)
-
-    def _written(self) -> database.History:
-        if self._file is None:
-            raise HistoryError("no history_file is named: nothing is kept")
-        return self._file
 
     def spark(self, node: str) -> Sparkline | None:
         """Return the sparkline of a valve, or None."""
@@ -261,13 +234,13 @@ class HistoryCache:
 
         Raises HistoryError if the file cannot be read.
         """
-        if self._file is None:
+        if self.file is None:
             return None
         with self._lock:
             if node not in self._histories:
                 kept = tuple(one for one in self.valves if one.name == node)
                 since, until = (time.time_ns() + sign * _READ_DEPTH for sign in (-1, 1))
-                found = database.valve_histories(self._file, kept, since, until)
+                found = database.valve_histories(self.file, kept, since, until)
                 self._histories[node] = found[0] if found else None
                 while len(self._histories) > _MOST_CACHED:
                     self._histories.popitem(last=False)
@@ -323,20 +296,11 @@ def _with_alarms(status: Status, alarms: Mapping[AlarmKind, Alarm]) -> Status:
 
 
 class KeptValves(HistoryCache):
-    """A history that supplies a plant with statuses, in place of identifiers.
-
-    Parameters
-    ----------
-    place : Path or HistoryServer
-        The history.
-    plant : Plant
-        Receiver of the statuses.
-    """
+    """A history that supplies a plant with statuses, in place of identifiers."""
 
     def __init__(self, place: Place, plant: Plant) -> None:
         super().__init__(place)
-        self._plant = plant
-        self._history = database.History(place)
+        self._plant, self._history = plant, database.History(place)
         self._told = (-1, -1)
         self._read: HistoryMark | None = None
         self._statuses: dict[KeptValve, list[Status]] = {}

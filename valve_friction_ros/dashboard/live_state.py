@@ -187,15 +187,6 @@ class Unread(NamedTuple):
     mark: Callable[[], object] | None = None
 
 
-class Expected(NamedTuple):
-    """The limit that a drift is expected to cross, with dates (ISO 8601)."""
-
-    limit: str
-    date: str
-    earliest: str
-    latest: str
-
-
 class Sources(NamedTuple):
     """Sources of the samples of a valve; empty names if unknown."""
 
@@ -205,12 +196,11 @@ class Sources(NamedTuple):
 
 
 class Drift(NamedTuple):
-    """Drift of the friction, N per month, with half width and the limit ahead, if any."""
+    """Drift of the friction, N per month, with half width; the date of a limit ahead, or empty."""
 
     value: float
     half_width: float
-    of: str
-    expected: Expected | None
+    expected: str
 
 
 class ValveAlarm(NamedTuple):
@@ -380,10 +370,7 @@ ESSENTIAL_KEYS = (
     "dead_band half width [%]",
     "friction_drift [N/month]",
     "friction_drift half width [N/month]",
-    "limit_expected",
     "limit_expected [date]",
-    "limit_expected earliest [date]",
-    "limit_expected latest [date]",
     "baseline_coulomb_friction [N]",
     "baseline half width [N]",
     "baseline_sliding_friction [N]",
@@ -493,12 +480,8 @@ def _drift(values: Mapping[str, str]) -> Drift | None:
     value = number(values.get("friction_drift [N/month]"))
     if not math.isfinite(value):
         return None
-    expected = None
-    if values.get("limit_expected"):
-        ends = ("", " [date]", " earliest [date]", " latest [date]")
-        expected = Expected(*(_text(values, f"limit_expected{end}", 40) for end in ends))
     width = number(values.get("friction_drift half width [N/month]"))
-    return Drift(value, width, _text(values, "friction_drift of", 80), expected)
+    return Drift(value, width, _text(values, "limit_expected [date]", 40))
 
 
 MOST_VALVES = 5000
@@ -578,12 +561,8 @@ class _Valve:
 class Plant:
     """The state of each valve, behind a lock: any thread may write and read.
 
-    A page never draws in a ROS callback: it reads `valves` in its own timer.
-
-    Parameters
-    ----------
-    silence : float
-        Time without a message, s, after which a valve is silent.
+    A page never draws in a ROS callback: it reads `valves` in its own timer. A valve is silent
+    after the time `silence`, s, without a message.
     """
 
     def __init__(self, silence: float) -> None:

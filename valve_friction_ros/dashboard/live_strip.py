@@ -48,64 +48,18 @@ def envelope(times: _Floats, values: _Floats, columns: int, span: float) -> Stri
     return Strip(times[kept], values[kept])
 
 
-class _Samples:
-    """The newest samples of a signal, in arrays with room at the end."""
+class _Samples(NamedTuple):
+    """The newest samples of a signal: stamps, ns, and values. The arrays never change."""
 
-    def __init__(self, most: int) -> None:
-        self._most = most
-        self._begin = self._end = 0
-        self._stamps = np.empty(0, dtype=np.int64)
-        self._values = np.empty(0)
-
-    @property
-    def stamps(self) -> NDArray[np.int64]:
-        """The stamps, ns; valid until the next change."""
-        return self._stamps[self._begin : self._end]
-
-    @property
-    def values(self) -> _Floats:
-        """The values; valid until the next change."""
-        return self._values[self._begin : self._end]
-
-    def clear(self) -> None:
-        self._begin = self._end = 0
-
-    def add(self, stamps: NDArray[np.int64], values: _Floats, span: int) -> None:
-        """Add samples, and drop those more than `span` ns older than the newest."""
-        stamps, values = stamps[-self._most :], values[-self._most :]
-        if self._end + stamps.size > self._stamps.size:
-            self._make_room(stamps.size)
-        end = self._end + stamps.size
-        self._stamps[self._end : end], self._values[self._end : end] = stamps, values
-        self._begin, self._end = max(self._begin, end - self._most), end
-        if self.stamps.size:
-            self._begin += int(np.argmax(self.stamps >= self.stamps[-1] - span))
-
-    def _make_room(self, count: int) -> None:
-        old_stamps, old_values = self.stamps, self.values
-        kept = old_stamps.size
-        size = max(1024, 2 * (kept + count))
-        self._stamps, self._values = np.empty(size, dtype=np.int64), np.empty(size)
-        self._stamps[:kept], self._values[:kept] = old_stamps, old_values
-        self._begin, self._end = 0, kept
+    stamps: NDArray[np.int64] = np.empty(0, dtype=np.int64)
+    values: _Floats = np.empty(0)
 
 
 class LiveStrip:
     """Samples of pressure and stem of one valve, from its subscriptions, behind a lock.
 
-    Parameters
-    ----------
-    span : float
-        Time span to keep, s.
-    most : int, optional
-        Maximum number of samples to keep per signal.
-    clock : callable, optional
-        Returns the time of arrival, s.
-
-    Attributes
-    ----------
-    trouble : str
-        Why no samples can arrive; empty if no fault is known.
+    It keeps the samples of the last `span` seconds, at most `most` per signal. `trouble` says why
+    no samples can arrive; it is empty if no fault is known.
     """
 
     def __init__(
@@ -113,9 +67,9 @@ class LiveStrip:
     ) -> None:
         self.span = span
         self.trouble = ""
-        self._clock = clock
+        self._most, self._clock = most, clock
         self._lock = threading.Lock()
-        self._signals = (_Samples(most), _Samples(most))
+        self._signals = [_Samples(), _Samples()]
         self._arrivals: list[float | None] = [None, None]
         self._count = 0
 
@@ -129,8 +83,11 @@ class LiveStrip:
         with self._lock:
             kept = self._signals[signal]
             if kept.stamps.size and stamps[-1] < kept.stamps[-1] - 1_000_000_000:
-                kept.clear()
-            kept.add(stamps, values, round(self.span * 1e9))
+                kept = _Samples()
+            stamps = np.concatenate([kept.stamps, stamps])[-self._most :]
+            values = np.concatenate([kept.values, values])[-self._most :]
+            begin = int(np.argmax(stamps >= stamps[-1] - round(self.span * 1e9)))
+            self._signals[signal] = _Samples(stamps[begin:], values[begin:])
             self._arrivals[signal] = self._clock()
             self._count += 1
 
@@ -161,16 +118,13 @@ class LiveStrip:
         ]
         return "".join(late)
 
-    def _copies(self) -> tuple[tuple[NDArray[np.int64], _Floats], ...]:
-        with self._lock:
-            return tuple((one.stamps.copy(), one.values.copy()) for one in self._signals)
-
     def strips(self, columns: int) -> tuple[Strip, Strip]:
         """Return pressure and stem, each with at most two points per column of pixels.
 
         The newest sample is at 0 s while samples arrive, and then moves to the left.
         """
-        signals = self._copies()
+        with self._lock:
+            signals = tuple(self._signals)
         newest = max((int(stamps[-1]) for stamps, _ in signals if stamps.size), default=0)
         still = self._still()
         shift = still if still > _STILL else 0.0
@@ -182,7 +136,8 @@ class LiveStrip:
 
     def loop(self, most: int) -> Strip:
         """Return stem over pressure with at most `most` samples, as (pressure, position)."""
-        (stamps, pressures), (times, positions) = self._copies()
+        with self._lock:
+            (stamps, pressures), (times, positions) = self._signals
         if stamps.size < 2 or times.size < 2:
             return Strip(np.empty(0), np.empty(0))
         step = -(-stamps.size // most)

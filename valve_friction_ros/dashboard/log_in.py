@@ -23,27 +23,18 @@ import secrets
 import time
 from collections import OrderedDict, deque
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
-from valve_friction_ros.dashboard.accounts import Access, Account, HashedPassword, require_private
+from valve_friction_ros.dashboard.accounts import Access, Account, require_private
 
 _MOST_KEYS = 10_000
 
 
 class AttemptLimit:
-    """Limits the attempts per key, such as an address, within a sliding period.
+    """Limits the attempts per key, such as an address, to `most` within a sliding period, s.
 
     Above 10,000 keys, those with the oldest attempts are forgotten.
-
-    Parameters
-    ----------
-    most : int
-        Maximum number of attempts within `period`.
-    period : float
-        Length of the period, s.
-    clock : callable
-        Returns the time, s.
     """
 
     def __init__(self, most: int, period: float, clock: Callable[[], float]) -> None:
@@ -72,6 +63,22 @@ class AttemptLimit:
             times.pop()
 
 
+_MOST_LINES = 60
+"""Maximum number of lines per minute on what others may do without end."""
+
+
+def limited(log: Callable[[str], None]) -> Callable[[str], None]:
+    """Return a log that passes on at most 60 lines per minute, and drops the others."""
+    lines = AttemptLimit(_MOST_LINES, 60.0, time.monotonic)
+
+    def tell(line: str) -> None:
+        if lines.wait("") <= 0:
+            lines.count("")
+            log(line)
+
+    return tell
+
+
 _MOST_SESSIONS = 1000
 
 
@@ -79,8 +86,7 @@ def _digest(text: str) -> str:
     return hashlib.sha256(text.encode(errors="surrogatepass")).hexdigest()
 
 
-@dataclass(frozen=True)
-class _Session:
+class _Session(NamedTuple):
     account: str
     """Digest of the account's line, so that a changed password or role ends its sessions."""
     end: float
@@ -89,25 +95,9 @@ class _Session:
 class Sessions:
     """The sessions of a dashboard; only a digest of each token is stored.
 
-    Parameters
-    ----------
-    accounts : sequence of Account
-        Accounts that may have a session.
-    lifetime : float
-        Duration of a session, s.
-    clock : callable
-        Returns the time, s since 1970.
-    file : Path or None
-        File, created with mode 600, that keeps sessions across a restart.
-    log : callable
-        Takes a line when the file can no longer be written.
-
-    Raises
-    ------
-    ValueError
-        If others can read the file.
-    OSError
-        If the file cannot be read or written.
+    A session lasts `lifetime`, s. A file, created with mode 600, keeps the sessions across a
+    restart; `log` takes a line when it can no longer be written. Raises ValueError if others can
+    read the file, and OSError if it cannot be read or written.
     """
 
     def __init__(
@@ -171,30 +161,16 @@ class Sessions:
     def _keep(self) -> None:
         if self._file is None:
             return
-        kept = {key: [one.account, one.end] for key, one in self._sessions.items()}
         draft = self._file.with_name(f".{os.getpid()}_{self._file.name}")
         draft.unlink(missing_ok=True)
         draft.touch(mode=0o600, exist_ok=False)
-        draft.write_text(json.dumps(kept))
+        draft.write_text(json.dumps(self._sessions))
         draft.replace(self._file)
 
 
 _ATTEMPT_PERIOD = 900.0
 _MOST_OF_ADDRESS, _MOST_OF_NAME = 10, 20
 _MOST_WAITING = 8
-
-
-@dataclass(frozen=True)
-class Refusal:
-    """A refused log-in.
-
-    Attributes
-    ----------
-    wait : int
-        Time until another attempt is allowed, s; 0 if name or password was wrong.
-    """
-
-    wait: int
 
 
 def network_of(address: str) -> str:
@@ -215,15 +191,6 @@ class LogIn:
     In 15 minutes an address has 10 wrong attempts, and a name 20 from all addresses. An unknown
     name is indistinguishable from a known one: time, counting and answer are the same. A thread
     compares one password at a time, so that attempts cannot overload the machine.
-
-    Parameters
-    ----------
-    access : Access
-        The accounts.
-    sessions : Sessions
-        The sessions.
-    clock : callable
-        Returns the time, s.
     """
 
     def __init__(
@@ -233,35 +200,33 @@ class LogIn:
         self._sessions = sessions
         self._addresses = AttemptLimit(_MOST_OF_ADDRESS, _ATTEMPT_PERIOD, clock)
         self._names = AttemptLimit(_MOST_OF_NAME, _ATTEMPT_PERIOD, clock)
-        self._unknown = HashedPassword.unknown(
-            like=access.accounts[0].password if access.accounts else None
-        )
         self._comparing = asyncio.Semaphore(1)
         self._waiting = 0
 
-    async def attempt(self, name: str, password: str, address: str) -> str | Refusal:
-        """Return the token of a new session, or a refusal.
+    async def attempt(self, name: str, password: str, address: str) -> str | int:
+        """Return the token of a new session, or after a refusal, the time to wait.
 
-        An attempt is counted before the comparison, so that simultaneous attempts gain nothing.
+        That is the time until another attempt is allowed, s; 0 if name or password was wrong. An
+        attempt is counted before the comparison, so that simultaneous attempts gain nothing.
         """
         network, name = network_of(address), name[:64]
         wait = max(self._addresses.wait(network), self._names.wait(name))
         if wait == 0 and self._waiting >= _MOST_WAITING:
             wait = 1
         if wait > 0:
-            return Refusal(wait)
+            return wait
         self._addresses.count(network)
         self._names.count(name)
         account = self._accounts.get(name)
-        known = self._unknown if account is None else account.password
+        compared = account or next(iter(self._accounts.values()))  # takes as long, and is refused
         self._waiting += 1
         try:
             async with self._comparing:
-                is_right = await asyncio.to_thread(known.matches, password)
+                is_right = await asyncio.to_thread(compared.password.matches, password)
         finally:
             self._waiting -= 1
         if account is None or not is_right:
-            return Refusal(0)
+            return 0
         self._addresses.forgive(network)
         self._names.forgive(name)
         return self._sessions.begin(account)

@@ -263,6 +263,13 @@ def quantity_texts(one: Quantity) -> tuple[str, str]:
     return number_and_width(known.value, known.half_width)
 
 
+def quantity_words(one: Quantity, unit: str = "") -> str:
+    """Write a quantity with its interval and unit; a dash if the record does not determine it."""
+    texts = quantity_texts(one)
+    is_known = one.if_determined.is_known
+    return " ".join(filter(None, (*texts, (unit or one.unit) * is_known)))
+
+
 def _place(ratio: float) -> float:
     span = math.log(_HIGHEST / _LOWEST)
     bounded = min(max(ratio, _LOWEST), _HIGHEST) if ratio > 0 else _LOWEST
@@ -307,7 +314,7 @@ def row_of(valve: Heard, spark: Sparkline | None, wall: float, href: str) -> Row
         "fcw": width,
         "fcof": FRICTIONS[friction.name] if friction.is_known else "",
         "drift": drift_number(drift) if drift else "–",
-        "expected": f"limit {drift.expected.date}" if drift and drift.expected else "",
+        "expected": f"limit {drift.expected}" if drift and drift.expected else "",
         "spark": spark.path if spark else "",
         "base": spark.base if spark else "",
         "days": spark.days if spark else 0,
@@ -319,10 +326,7 @@ def row_of(valve: Heard, spark: Sparkline | None, wall: float, href: str) -> Row
 class RowFeed:
     """Rows for one browser; sends only changes.
 
-    Parameters
-    ----------
-    href : callable
-        Returns the address of a valve's page from the name of its identifier.
+    `href` returns the address of a valve's page from the name of its identifier.
     """
 
     def __init__(self, href: Callable[[str], str]) -> None:

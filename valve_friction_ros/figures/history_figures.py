@@ -11,6 +11,7 @@
 
 import textwrap
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -131,30 +132,19 @@ def _draw_limits(axes: Axes, history: ValveHistory, span: tuple[int, int]) -> No
     """Draw the baseline and limits in force at each identification, across the axis."""
     times = [entry.time for entry in history.entries]
     of = trended(history.entries[-1].baseline)
-    levels = np.array(
-        [
-            np.nan if (level := friction_of(entry.baseline, of)) is None else level
-            for entry in history.entries
-        ]
-    )
+    known = [friction_of(entry.baseline, of) for entry in history.entries]
+    levels = np.array(known, dtype=float)  # nan for None
     if np.isnan(levels).all():
         return
     dates = _dates([span[0], *times, span[1]])
-    axes.step(
-        dates, [levels[0], *levels, levels[-1]], where="post", color="0.4", lw=1.0, label="baseline"
-    )
+
+    def draw(heights: NDArray[np.float64], label: str, **style: Any) -> None:
+        axes.step(dates, np.pad(heights, 1, "edge"), where="post", label=label, **style)
+
+    draw(levels, "baseline", color="0.4", lw=1.0)
     for name, colour in _LIMITS.items():
         ratios = np.array([getattr(entry.limits, name) for entry in history.entries])
-        limit = ratios * levels
-        axes.step(
-            dates,
-            [limit[0], *limit, limit[-1]],
-            where="post",
-            color=colour,
-            ls="--",
-            lw=1.2,
-            label=f"{LIMIT_NAMES[name]} ({name})",
-        )
+        draw(ratios * levels, f"{LIMIT_NAMES[name]} ({name})", color=colour, ls="--", lw=1.2)
 
 
 def _what(history: ValveHistory) -> str:

@@ -146,10 +146,7 @@ def _format(path: Path) -> str:
 def require_picture_file(path: Path) -> None:
     """Refuse an unsuitable picture file before the work begins.
 
-    Raises
-    ------
-    ValueError
-        If the ending is not a picture format, or the folder does not exist; the message names it.
+    Raises ValueError if the ending is not a picture format, or the folder does not exist.
     """
     endings = Figure().canvas.get_supported_filetypes()
     if _format(path) not in endings:
@@ -161,10 +158,7 @@ def require_picture_file(path: Path) -> None:
 def save_picture(figure: Figure, path: Path) -> None:
     """Save a figure to a file in the format of its ending.
 
-    Raises
-    ------
-    OSError
-        If the file cannot be written. It names `path`; no partial picture remains.
+    Raises OSError, which names `path`, if it cannot be written; no partial picture remains.
     """
     content = io.BytesIO()
     figure.savefig(content, format=_format(path))

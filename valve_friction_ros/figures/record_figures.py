@@ -124,17 +124,7 @@ def _with_verdict(words: str, one: Parameter) -> str:
 def validation_figure(validation: Validation, valve: Valve) -> Figure:
     """Draw measured and simulated stem, residual and drive over time.
 
-    Parameters
-    ----------
-    validation : Validation
-        Record and simulated stem.
-    valve : Valve
-        Valve whose travel appears in the title.
-
-    Returns
-    -------
-    Figure
-        Figure to save or show; matplotlib's global state is not changed.
+    The title gives the rms of the residual as a share of the travel, too.
     """
     share = valve.share_of_travel(validation.rms)
     of_travel = f" ({percentage(share)} of travel)" if math.isfinite(share) else ""
@@ -161,18 +151,7 @@ def validation_figure(validation: Validation, valve: Valve) -> Figure:
 
 
 def plan_figure(plan: StrokePlan) -> Figure:
-    """Draw the pressure before the converter, and the expected stem for each assumed friction.
-
-    Parameters
-    ----------
-    plan : StrokePlan
-        The plan.
-
-    Returns
-    -------
-    Figure
-        Figure to save or show; matplotlib's global state is not changed.
-    """
+    """Draw the pressure before the converter, and the expected stem for each assumed friction."""
     test, travel = plan.test, plan.valve.travel
     figure = titled_figure(f"planned stroke test: {test.duration:.3g} s, {test.cycles} cycles")
     pressure, stem = figure.subplots(2, sharex=True)

@@ -105,10 +105,7 @@ def identification_report(record: IdentifiedRecord) -> Page:
 def write_identification_report(path: Path, facts: Mapping[str, Any]) -> None:
     """Write the page on an `IdentifiedRecord`, given by its attributes, to a file.
 
-    Raises
-    ------
-    OSError
-        If the file cannot be written.
+    Raises OSError if it cannot be written.
     """
     write_report(identification_report(IdentifiedRecord(**facts)), path)
 

@@ -14,7 +14,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from datetime import datetime, timezone
 from functools import cached_property
-from typing import NamedTuple
 
 from valve_friction_ros.health import (
     Baseline,
@@ -222,11 +221,6 @@ def date_line(record: IdentifiedRecord) -> str:
     return "; ".join(filter(None, (known, record.dated))) + "."
 
 
-class _Finding(NamedTuple):
-    what: str
-    advice: str
-
-
 _CHECK = "check the sensors and their mounting, then identify it again"
 _AS_BASELINE = "move the valve as its baseline was taken, and identify it again"
 _BASELINE = "set a baseline, the friction of the healthy valve"
@@ -275,21 +269,20 @@ def diagnosis_sentence(record: IdentifiedRecord) -> str:
     if record.diagnosis.ratio is None and state in _STATE_WORDS:
         vanished = next(one for one in _frictions(record) if math.isnan(one.value))
         size = f"at most {vanished.magnitude_bound:.2g} N, too small to be identified"
-        finding = _Finding(_STATE_WORDS[state].format(ratio=size), friction_advice(state.name))
+        finding, advice = _STATE_WORDS[state].format(ratio=size), friction_advice(state.name)
     elif math.isnan(friction.value):
-        finding = _Finding(
-            f"this record does not determine the friction ({friction.reason})",
-            "move the valve through several fast strokes in both directions and identify it again",
+        finding = f"this record does not determine the friction ({friction.reason})"
+        advice = (
+            "move the valve through several fast strokes in both directions and identify it again"
         )
     elif friction.value < 0:
-        finding = _Finding(
-            f"the identified friction is {friction.value:.4g} N, but friction cannot be negative",
-            friction_advice(FrictionState.IMPOSSIBLE.name),
+        finding = (
+            f"the identified friction is {friction.value:.4g} N, but friction cannot be negative"
         )
+        advice = friction_advice(FrictionState.IMPOSSIBLE.name)
     else:
-        finding = _found(record)
-    doubt = _doubt(record)
-    told = f"{doubt}{finding.what}{_consequence(record)}: {finding.advice}"
+        finding, advice = _found(record)
+    told = f"{_doubt(record)}{finding}{_consequence(record)}: {advice}"
     sentences = (told, *(one.message for one in record.findings))
     return " ".join(f"{capitalised(one)}." for one in sentences)
 
@@ -312,15 +305,14 @@ def _friction(record: IdentifiedRecord) -> Parameter:
     return [*below, *known, *frictions][0]
 
 
-def _found(record: IdentifiedRecord) -> _Finding:
+def _found(record: IdentifiedRecord) -> tuple[str, str]:
+    """Return a finding on a known friction, and the advice."""
     friction, diagnosis = _friction(record), record.diagnosis
     if diagnosis.ratio is None:
         size = with_width(friction.value, friction.half_width)
         advice = _BASELINE if record.baseline is None else _AS_BASELINE
-        return _Finding(
-            f"the friction is {size} N{_sureness(friction)}",
-            f"to find out whether it has grown, {advice}",
-        )
+        found = f"the friction is {size} N{_sureness(friction)}"
+        return found, f"to find out whether it has grown, {advice}"
     ratio = (
         f"{diagnosis.ratio.value:.2f} times that of the healthy valve (95 % interval: "
         f"{diagnosis.ratio.low:.2f} to {diagnosis.ratio.high:.2f}){_sureness(friction)}"
@@ -330,11 +322,11 @@ def _found(record: IdentifiedRecord) -> _Finding:
             f"before any work on the packing, check {drive_scale(record.valve)}, as the spring "
             "constant has changed by the same factor"
         )
-        return _Finding(f"the friction seems to have changed, {ratio}", advice)
+        return f"the friction seems to have changed, {ratio}", advice
     if (what := _STATE_WORDS.get(diagnosis.state)) is not None:
-        return _Finding(what.format(ratio=ratio), friction_advice(diagnosis.state.name))
+        return what.format(ratio=ratio), friction_advice(diagnosis.state.name)
     advice = _CHECK if _doubt(record) else "no action is needed"
-    return _Finding(f"the friction is normal, {ratio}", advice)
+    return f"the friction is normal, {ratio}", advice
 
 
 def _sureness(friction: Parameter) -> str:

@@ -76,8 +76,7 @@ class Column:
 class PageTable:
     """Rows of text under headings, with one cell per column.
 
-    The caption is printed above the table. `marked` rows, counted from 0, are highlighted. Raises
-    ValueError if a row has too few or too many cells, or if a marked row does not exist.
+    The caption is printed above the table. `marked` rows, counted from 0, are highlighted.
     """
 
     kind: ClassVar[str] = "table"
@@ -86,15 +85,6 @@ class PageTable:
     rows: tuple[tuple[str, ...], ...]
     caption: str = ""
     marked: tuple[int, ...] = ()
-
-    def __post_init__(self) -> None:
-        """Refuse a table with missing cells."""
-        for number, row in enumerate(self.rows):
-            if len(row) != len(self.columns):
-                raise ValueError(f"row {number} has {len(row)} cells for {len(self.columns)}")
-        for number in self.marked:
-            if not 0 <= number < len(self.rows):
-                raise ValueError(f"the marked row {number} does not exist")
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,16 +126,6 @@ class Picture:
         """Whether a wide page shows two such pictures side by side."""
         return self.figure.get_figwidth() <= _NARROW
 
-    @property
-    def source(self) -> str:
-        """The picture as a data address (PNG, base64)."""
-        return _address(self.png)
-
-    @property
-    def narrow_source(self) -> str:
-        """The picture for a narrow screen as a data address; empty without one."""
-        return "" if self.narrow_png is None else _address(self.narrow_png)
-
 
 def _drawn(figure: Figure, resolution: int) -> bytes:
     stream = io.BytesIO()
@@ -156,6 +136,7 @@ def _drawn(figure: Figure, resolution: int) -> bytes:
 
 
 def _address(png: bytes) -> str:
+    """Return a picture as a data address."""
     return f"data:image/png;base64,{base64.b64encode(png).decode('ascii')}"
 
 
@@ -205,7 +186,7 @@ def render(page: Page) -> str:
     It is readable on a screen of any width, and prints on A4.
     """
     environment = page_environment("valve_friction_ros.reports")
-    environment.filters["typeset"] = typeset
+    environment.filters |= {"typeset": typeset, "address": _address}
     return environment.get_template("page.html").render(page=page)
 
 

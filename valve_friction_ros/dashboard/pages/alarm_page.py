@@ -9,27 +9,15 @@
 
 """The page *Alarms*: lists, filters, answers and exports current alarms and all events."""
 
-import asyncio
 import time
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
+from zoneinfo import ZoneInfo
 
 from nicegui import run, ui
 
-from valve_friction_ros.dashboard.alarm_list import (
-    ACTIONS,
-    ALL,
-    LASTING,
-    MOST_ROWS,
-    RANGES,
-    AlarmSelection,
-    Asked,
-    areas_of,
-    possible,
-    request_of,
-    row_of,
-)
 from valve_friction_ros.dashboard.context import Answer, DashboardContext
 from valve_friction_ros.dashboard.live_state import ValveAlarm, ValveView
 from valve_friction_ros.dashboard.pages.theme import (
@@ -45,47 +33,202 @@ from valve_friction_ros.dashboard.pages.theme import (
     search_field,
     text,
 )
-from valve_friction_ros.dashboard.plant_rows import moment
+from valve_friction_ros.dashboard.plant_rows import address_of, moment
 from valve_friction_ros.health import AlarmAction, AlarmError, AlarmKind, AlarmRequest, AlarmState
-from valve_friction_ros.history import HistoryError, KeptAlarmEvent
+from valve_friction_ros.health.alarms import TRANSITIONS
+from valve_friction_ros.history import AlarmFilter, HistoryError, KeptAlarmEvent
 from valve_friction_ros.outside_text import printable
+from valve_friction_ros.streams import DAY
+from valve_friction_ros.wording import alarm_advice
 
 _PERIOD = 1.0
+
+RANGES = {
+    "1 h": DAY // 24,
+    "1 day": DAY,
+    "1 week": 7 * DAY,
+    "1 month": 30 * DAY,
+    "1 year": 366 * DAY,
+}
+"""Selectable time spans before now, ns."""
+_ALL = "all"
+_MOST_ROWS = 500
+"""Maximum number of rows on a page; the CSV has all."""
+_LONGEST_SEARCH = 200
+
+_ACTIONS = {
+    AlarmAction.ACKNOWLEDGE: "Acknowledge",
+    AlarmAction.SHELVE: "Shelve",
+    AlarmAction.UNSHELVE: "Unshelve",
+    AlarmAction.TAKE_OUT: "Take out of service",
+    AlarmAction.PUT_BACK: "Put back into service",
+    AlarmAction.COMMENT: "Comment",
+}
+"""Actions of a person, with the labels of their buttons."""
+
+_LASTING = frozenset({AlarmAction.SHELVE, AlarmAction.TAKE_OUT})
+"""Actions that last for a set time."""
+
+
+def _possible(state: str) -> tuple[AlarmAction, ...]:
+    """Return the actions that an alarm allows in a state, given in words."""
+    return tuple(
+        one for one in _ACTIONS if any(s.value == state and a is one for s, a in TRANSITIONS)
+    )
+
+
+@dataclass(frozen=True)
+class AlarmSelection:
+    """Filters of an alarm page.
+
+    Attributes
+    ----------
+    is_journal : bool
+        Whether to list all events; else only alarms that are not normal.
+    span : str
+        Name of the time span before now (`RANGES`), or ``all``.
+    search : str
+        Words; each must occur in tag, name, sentence, person or text.
+    area : str
+        Area of the valves, including its sub-areas.
+    states : frozenset of AlarmState
+        States to list; empty for all.
+    kinds : frozenset of AlarmKind
+        Kinds of alarm to list; empty for all.
+    """
+
+    is_journal: bool = False
+    span: str = _ALL
+    search: str = ""
+    area: str = "/"
+    states: frozenset[AlarmState] = frozenset()
+    kinds: frozenset[AlarmKind] = frozenset()
+
+    @classmethod
+    def from_query(cls, query: Mapping[str, str]) -> "AlarmSelection":
+        """Read the filters from an address; ignore unknown parts."""
+        states, kinds = query.get("state", "").split(","), query.get("kind", "").split(",")
+        span = query.get("span", _ALL)
+        return cls(
+            is_journal=query.get("view") == "events",
+            span=span if span in RANGES else _ALL,
+            search=query.get("q", "")[:_LONGEST_SEARCH],
+            area=query.get("area", "/")[:_LONGEST_SEARCH] or "/",
+            states=frozenset(one for one in AlarmState if one.name.lower() in states),
+            kinds=frozenset(one for one in AlarmKind if one.value in kinds),
+        )
+
+    def to_query(self) -> dict[str, str]:
+        """Return the parts of the address, without defaults."""
+        parts = {
+            "view": "events" if self.is_journal else "",
+            "span": "" if self.span == _ALL else self.span,
+            "q": self.search,
+            "area": "" if self.area == "/" else self.area,
+            "state": ",".join(one.name.lower() for one in AlarmState if one in self.states),
+            "kind": ",".join(one.value for one in AlarmKind if one in self.kinds),
+        }
+        return {key: text for key, text in parts.items() if text}
+
+    def address(self, more: Mapping[str, str], path: str = "/alarms") -> str:
+        """Return the address of this list, with further parts."""
+        return address_of(path, {**self.to_query(), **more})
+
+    def chosen(self, now: int) -> AlarmFilter:
+        """Return the filter of the history at a time, ns since 1970."""
+        since = now - RANGES[self.span] if self.span in RANGES else AlarmFilter().since
+        return AlarmFilter(
+            since=since,
+            area=self.area,
+            states=self.states,
+            kinds=self.kinds,
+            words=self.search,
+        )
+
+
+def _row(number: int, one: KeptAlarmEvent, zone: ZoneInfo, href: str, is_journal: bool) -> Any:
+    """Return a row under fixed keys, with `number` as its identity."""
+    event, alarm = one.event, one.event.alarm
+    level = alarm.condition.level
+    by = f"{event.action.value} by {event.who}" if event.who else event.action.value
+    return {
+        "i": number,
+        "href": href,
+        "tag": printable(one.valve.tag, 80),
+        "area": printable(one.area, 120),
+        "kind": alarm.kind.words,
+        "state": alarm.state.value,
+        "until": "" if alarm.until is None else moment(alarm.until, zone)[:16],
+        "css": level.name.lower() if alarm.is_told else "unknown",
+        "level": level.name if alarm.is_active else "",
+        "advice": alarm_advice(alarm.kind.value, level.name) if alarm.is_told else "",
+        "say": printable(alarm.message, 300),
+        "when": moment(event.time, zone),
+        "raised": moment(alarm.raised, zone)[:16],
+        "by": printable(by, 120),
+        "text": printable(event.text, 500),
+        "can": [] if is_journal else [a.name for a in _possible(alarm.state.value)],
+    }
+
+
+def _areas(valves: Iterable[str]) -> tuple[str, ...]:
+    """Return the areas of identifiers, with all enclosing areas, sorted."""
+    found = {"/"}
+    for name in valves:
+        parts = name.strip("/").split("/")[:-2]
+        found |= {"/" + "/".join(parts[: k + 1]) for k in range(len(parts))}
+    return tuple(sorted(found))
 
 
 class AlarmTable(RowTable, component="alarm_table.js"):
     """Alarms or events as rows."""
 
 
-async def asked_of_person(
-    title: str, actions: Sequence[AlarmAction], name: str, chosen: AlarmAction | None = None
-) -> Asked | None:
-    """Ask for an action, a name, a comment and a duration; return None if cancelled.
+class _RequestLine(AnswerLine):
+    """Asks for a request on alarms in a dialog, makes it, and shows its outcome."""
 
-    With an account, its name is fixed.
-    """
-    made: list[Any] = []
+    is_busy = False
 
-    def draw() -> None:
-        names = {one.name: ACTIONS[one] for one in actions}
-        action = ui.select(names, value=(chosen or actions[0]).name, label="Action")
-        hours = ui.number("Duration, hours", value=8.0, min=0.1, max=8784, step=1)
-        who = ui.input("Your name", value=name)
-        who.set_enabled(not name)
-        made.extend((action, who, ui.input("Comment"), hours))
-        for one in made:
-            one.classes("vf-select")
+    async def ask(
+        self,
+        title: str,
+        actions: Sequence[AlarmAction],
+        name: str,
+        answer: Callable[[AlarmRequest], Awaitable[Answer]],
+        chosen: AlarmAction | None = None,
+    ) -> None:
+        """Ask for action, person, comment and duration; `name` is that of an account, if any."""
+        made: list[Any] = []
 
-        def show() -> None:
-            hours.set_visibility(AlarmAction[str(action.value)] in LASTING)
+        def draw() -> None:
+            names = {one.name: _ACTIONS[one] for one in actions}
+            action = ui.select(names, value=(chosen or actions[0]).name, label="Action")
+            hours = ui.number("Duration, hours", value=8.0, min=0.1, max=8784, step=1)
+            who = ui.input("Your name", value=name)
+            who.set_enabled(not name)
+            made.extend((action, who, ui.input("Comment"), hours))
+            for one in made:
+                one.classes("vf-select")
 
-        action.on_value_change(show)
-        show()
+            def show() -> None:
+                hours.set_visibility(AlarmAction[str(action.value)] in _LASTING)
 
-    if not await agreed(title, title, draw, ("Cancel", "Confirm"), "flat no-caps"):
-        return None
-    action, who, words, hours = (one.value for one in made)
-    return Asked(AlarmAction[str(action)], str(who or ""), str(words or ""), float(hours or 0.0))
+            action.on_value_change(show)
+            show()
+
+        if not await agreed(title, title, draw, ("Cancel", "Confirm"), "flat no-caps"):
+            return
+        action, who, words, hours = (one.value for one in made)
+        done, duration = AlarmAction[str(action)], 3600 * float(hours or 0.0)
+        try:
+            request = AlarmRequest(done, str(who or ""), str(words or ""), duration)
+        except AlarmError as error:
+            self.tell(False, str(error))
+            return
+        self.is_busy = True
+        self.say("busy", f"{_ACTIONS[done]} …")
+        self.tell(*await answer(request))
+        self.is_busy = False
 
 
 class _AlarmPage:
@@ -95,7 +238,6 @@ class _AlarmPage:
         self._context, self._selection = context, selection
         self._events: tuple[KeptAlarmEvent, ...] = ()
         self._shown: tuple[object, ...] = ()
-        self._is_busy = False
 
     def address(self, common: dict[str, str]) -> str:
         return self._selection.address(common)
@@ -108,9 +250,9 @@ class _AlarmPage:
             search_field("Search tag, message, person", one.search, self._select)
             lists = {False: "current alarms", True: "alarm history"}
             self._choice("List", lists, "is_journal")
-            spans = {name: f"last {name}" for name in RANGES} | {ALL: "all time"}
+            spans = {name: f"last {name}" for name in RANGES} | {_ALL: "all time"}
             self._choice("Time", spans, "span")
-            areas = areas_of(kept.name for kept in self._context.history.valves)
+            areas = _areas(kept.name for kept in self._context.history.valves)
             names = {area: "all areas" if area == "/" else area for area in (*areas, one.area)}
             self._choice("Area", names, "area")
             self._several("State", {s: s.value for s in AlarmState}, "states")
@@ -119,7 +261,7 @@ class _AlarmPage:
             if may:
                 self._all = ui.button("Acknowledge all", on_click=self._acknowledge_all, color=None)
                 self._all.props("no-caps unelevated dense").classes("vf-act vf-act-first")
-        self._answer = AnswerLine()
+        self._answer = _RequestLine()
         self._table = AlarmTable({"rows": [], "journal": False, "empty": ""}, may=may)
         self._table.on("ask", lambda event: self._ask(event.args))
         self._note = ui.label("").classes("vf-note")
@@ -162,32 +304,30 @@ class _AlarmPage:
     async def _read(self) -> None:
         history, one = self._context.history, self._selection
         minute = time.time_ns() // 60_000_000_000
-        state = (one, history.alarm_revision, history.problem, minute * (one.span != ALL))
+        state = (one, history.alarm_revision, history.problem, minute * (one.span != _ALL))
         if state == self._shown:
             return
         problem, events = history.problem, tuple[KeptAlarmEvent, ...]()
         try:
             chosen = one.chosen(time.time_ns())
-            found = await run.io_bound(history.alarms, chosen, one.is_journal, MOST_ROWS + 1)
+            found = await run.io_bound(history.alarms, chosen, one.is_journal, _MOST_ROWS + 1)
             events = found or ()  # None during shutdown
         except HistoryError as error:
             problem = str(error)
-        self._shown, self._events = state, events[:MOST_ROWS]
+        self._shown, self._events = state, events[:_MOST_ROWS]
         address = self._page.link
         rows = [
-            row_of(
-                k, each, self._page.zone, address("/valve", node=each.valve.name), one.is_journal
-            )
+            _row(k, each, self._page.zone, address("/valve", node=each.valve.name), one.is_journal)
             for k, each in enumerate(self._events)
         ]
         empty = "No alarm matches the filters." if one.to_query() else "No current alarms."
         self._table.send({"rows": rows, "journal": one.is_journal, "empty": empty})
         waiting = sum(each.event.alarm.state.needs_answer for each in self._events)
-        more = f"The newest {MOST_ROWS} are shown; the CSV has all." * (len(events) > MOST_ROWS)
+        more = f"The newest {_MOST_ROWS} are shown; the CSV has all." * (len(events) > _MOST_ROWS)
         self._note.set_text(problem or more)
         if self._context.visitors.may_operate():
             self._all.set_visibility(not one.is_journal)
-            self._all.set_enabled(bool(waiting) and not self._is_busy)
+            self._all.set_enabled(bool(waiting) and not self._answer.is_busy)
             self._all.set_text(f"Acknowledge all {waiting}" if waiting else "Acknowledge all")
 
     # Answers
@@ -203,65 +343,22 @@ class _AlarmPage:
         alarm = one.event.alarm
         chosen = AlarmAction[name] if name in AlarmAction.__members__ else None
         title = f"{printable(one.valve.tag, 80)}, {alarm}"
-        found = await asked_of_person(
-            title, possible(alarm.state.value), self._context.visitors.name(), chosen
-        )
-        if found is not None:
-            await self._call([(one.valve.name, alarm.kind.value)], found)
+        answer = partial(self._context.answer_alarm, one.valve.name, alarm.kind)
+        may, who = _possible(alarm.state.value), self._context.visitors.name()
+        await self._answer.ask(title, may, who, answer, chosen)
+        self._shown = ()
 
     async def _acknowledge_all(self) -> None:
         some = [one for one in self._events if one.event.alarm.state.needs_answer]
-        title = f"Acknowledge {len(some)} alarms"
-        only = (AlarmAction.ACKNOWLEDGE,)
-        found = await asked_of_person(title, only, self._context.visitors.name())
-        if found is None:
-            return
-        if self._context.is_live and not self._context.history.is_file:
-            await self._call([(o.valve.name, o.event.alarm.kind.value) for o in some], found)
-            return
-        try:
-            request = AlarmRequest(found.action, found.who, found.text)
-        except AlarmError as error:
-            self._answer.say("error", str(error))
-            return
         alarms = [(one.valve, one.event.alarm.kind) for one in some]
-        answer = await self._context.answer_alarms(alarms, request)
-        self._answer.tell(*answer)
-
-    async def _call(self, alarms: Sequence[tuple[str, str]], asked: Asked) -> None:
-        """Make a request for each alarm: valves in parallel, alarms of one valve in turn."""
-        self._is_busy = True
-        self._answer.say("busy", f"{ACTIONS[asked.action]} …")
-        by_valve: dict[str, list[str]] = {}
-        for node, kind in alarms:
-            by_valve.setdefault(node, []).append(kind)
-
-        async def of_valve(node: str, kinds: Sequence[str]) -> list[Answer]:
-            call = self._context.operator.call
-            return [await call(node, request_of(asked, kind)) for kind in kinds]
-
-        found = await asyncio.gather(*(of_valve(*each) for each in by_valve.items()))
-        answers = [answer for some in found for answer in some]
-        self._is_busy = False
-        if wrong := [printable(one.message, 500) for one in answers if not one.success]:
-            self._answer.say("error", f"{len(wrong)} of {len(answers)} refused: {wrong[0]}")
-        elif len(answers) == 1:
-            self._answer.tell(*answers[0])
-        else:
-            self._answer.say("ok", f"{len(answers)} done")
+        only, who = (AlarmAction.ACKNOWLEDGE,), self._context.visitors.name()
+        answer = partial(self._context.answer_alarms, alarms)
+        await self._answer.ask(f"Acknowledge {len(some)} alarms", only, who, answer)
         self._shown = ()
 
 
 class AlarmStates:
-    """The alarms of one valve that are not normal, with buttons to answer them.
-
-    Parameters
-    ----------
-    context : DashboardContext
-        Context that calls the services.
-    node : str
-        The identifier.
-    """
+    """The alarms of one valve that are not normal, with buttons to answer them."""
 
     def __init__(self, context: DashboardContext, node: str) -> None:
         self._context, self._node = context, node
@@ -270,13 +367,13 @@ class AlarmStates:
     def draw(self) -> None:
         """Draw the panel, still without alarms."""
         self._body = element("div")
-        self._answer = AnswerLine()
+        self._answer = _RequestLine()
         if self._context.visitors.may_operate():
             with element("div", "vf-actions", role="group", aria_label="Alarms of this valve"):
                 for action in (AlarmAction.TAKE_OUT, AlarmAction.PUT_BACK):
                     ui.button(
-                        f"{ACTIONS[action]} …",
-                        on_click=lambda action=action: self._ask(None, action),
+                        f"{_ACTIONS[action]} …",
+                        on_click=partial(self._ask, "All alarms of this valve", None, [action]),
                         color=None,
                     ).props("no-caps unelevated dense").classes("vf-act")
 
@@ -300,26 +397,28 @@ class AlarmStates:
             chip(css, name)
             ui.label(f"{one.state} until {one.until}" if one.until else one.state)
             if self._context.visitors.may_operate():
-                may = possible(one.state)
-                if AlarmAction.ACKNOWLEDGE in may:
-                    self._button("Acknowledge", name, one, AlarmAction.ACKNOWLEDGE)
-                self._button("More …", name, one, None)
+                may, acknowledge = _possible(one.state), AlarmAction.ACKNOWLEDGE
+                ask = partial(self._ask, name, AlarmKind(one.kind), may)
+                if acknowledge in may:
+                    self._button("Acknowledge", name, partial(ask, acknowledge))
+                self._button("More …", name, ask)
             text("p", one.message, "vf-none")
 
-    def _button(self, words: str, name: str, one: ValveAlarm, action: AlarmAction | None) -> None:
-        made = ui.button(words, on_click=lambda: self._ask(one, action), color=None)
+    @staticmethod
+    def _button(words: str, name: str, click: Callable[[], Awaitable[None]]) -> None:
+        made = ui.button(words, on_click=click, color=None)
         made.props("no-caps unelevated dense").classes("vf-act")
         made.props["aria-label"] = f"{words.rstrip(' …')}: {name}"
 
-    async def _ask(self, one: ValveAlarm | None, action: AlarmAction | None) -> None:
-        may = [action] if one is None and action is not None else possible(one.state if one else "")
-        title = "All alarms of this valve" if one is None else one.kind.replace("_", " ")
-        found = await asked_of_person(title, may, self._context.visitors.name(), action)
-        if found is None:
-            return
-        request = request_of(found, "all" if one is None else one.kind)
-        answer = await self._context.operator.call(self._node, request)
-        self._answer.tell(*answer)
+    async def _ask(
+        self,
+        title: str,
+        kind: AlarmKind | None,
+        may: Sequence[AlarmAction],
+        chosen: AlarmAction | None = None,
+    ) -> None:
+        answer = partial(self._context.answer_alarm, self._node, kind)
+        await self._answer.ask(title, may, self._context.visitors.name(), answer, chosen)
 
 
 def alarm_page(context: DashboardContext, query: dict[str, str]) -> None:

@@ -31,7 +31,7 @@ export default {
       </tbody>
     </table>
     <p ref="end" class="vf-none" v-if="near.length < rows.length">{{ rows.length - near.length }} more below.</p>
-    <p class="vf-empty" v-else>{{ empty }}</p>
+    <p class="vf-empty" v-if="!rows.length">{{ empty }}</p>
   </div>`,
   props: { initial: Object, may: Boolean },
   emits: ["ask"],

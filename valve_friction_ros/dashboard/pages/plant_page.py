@@ -17,7 +17,7 @@ from typing import Any
 from nicegui import run, ui
 
 from valve_friction_ros.dashboard.context import DashboardContext
-from valve_friction_ros.dashboard.live_state import Heard, Quantity
+from valve_friction_ros.dashboard.live_state import Heard
 from valve_friction_ros.dashboard.pages.theme import (
     Frame,
     RowTable,
@@ -42,7 +42,7 @@ from valve_friction_ros.dashboard.plant_rows import (
     compared,
     levels_in,
     moment,
-    quantity_texts,
+    quantity_words,
     selected,
     side_of_entry,
     side_of_view,
@@ -330,7 +330,7 @@ class _ComparePage:
                 ):
                     table_row(*((w, "" if w == name else "vf-n") for w in (name, *words, "", "")))
                 for row in compared(one, other):
-                    numbers = (*map(_side_words, (row.one, row.other)), row.ratio_words)
+                    numbers = (*map(quantity_words, (row.one, row.other)), row.ratio_words)
                     name = row.name.replace("_", " ")
                     cells = ((name, ""), *((each, "vf-n") for each in numbers))
                     with table_row(*cells), element("td"):
@@ -339,11 +339,6 @@ class _ComparePage:
                             chip(state, row.verdict)
                 said = ((side.sentence, "vf-words vf-said") for side in (one, other))
                 table_row(("diagnosis", ""), *said, ("", ""), ("", ""))
-
-
-def _side_words(one: Quantity) -> str:
-    unit = one.unit if one.if_determined.is_known else ""
-    return " ".join((*quantity_texts(one), unit)).strip()
 
 
 async def compare_page(context: DashboardContext, query: dict[str, str]) -> None:

@@ -13,6 +13,7 @@ import logging
 import socket
 import time
 from collections.abc import Awaitable, Callable
+from pathlib import Path
 
 from fastapi import Request, Response
 from fastapi.middleware.gzip import GZipMiddleware
@@ -21,12 +22,10 @@ from nicegui import app, run, ui
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from valve_friction_ros.dashboard.accounts import Access
-from valve_friction_ros.dashboard.alarm_list import AlarmSelection
 from valve_friction_ros.dashboard.context import DashboardContext, ValveFiles
 from valve_friction_ros.dashboard.gate import Guard, guard, server_options
-from valve_friction_ros.dashboard.pages.alarm_page import alarm_page
+from valve_friction_ros.dashboard.pages.alarm_page import AlarmSelection, alarm_page
 from valve_friction_ros.dashboard.pages.plant_page import compare_page, plant_page
-from valve_friction_ros.dashboard.pages.theme import load_style
 from valve_friction_ros.dashboard.pages.valve_page import valve_page
 from valve_friction_ros.history import HistoryError, alarms_as_csv
 
@@ -91,7 +90,7 @@ def serve(
     `log` takes the lines on ended connections. Pages are refused unless `is_active`.
     """
     app.add_middleware(_Resting, is_active=is_active)
-    load_style()
+    ui.add_css(Path(__file__).with_name("dashboard.css"), shared=True)
     app.config.quasar_config["loadingBar"]["skipHijack"] = True  # it has no name for screen readers
     logging.getLogger("uvicorn.error").addFilter(_Gone())
     pages: dict[str, _Draw] = {

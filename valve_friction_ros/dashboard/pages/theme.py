@@ -12,7 +12,6 @@
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 from zoneinfo import ZoneInfo
 
@@ -25,15 +24,7 @@ from valve_friction_ros.outside_text import printable
 
 
 class RowTable(ui.element):
-    """Rows kept by the browser, which receives only changes.
-
-    Parameters
-    ----------
-    initial : mapping
-        Initial content.
-    **props : object
-        Further properties of the component in the browser.
-    """
+    """Rows kept by the browser, which receives only changes of the initial content."""
 
     def __init__(self, initial: Mapping[str, Any], **props: Any) -> None:
         super().__init__()
@@ -52,15 +43,9 @@ class AddressBar(ui.element, component="address.js"):
         self.run_method("replace", address)
 
 
-_STYLE = Path(__file__).with_name("dashboard.css")
 _THEMES: dict[str, bool | None] = {"auto": None, "light": False, "dark": True}
 _COMMON = ("tz", "theme")
 _PAGES = (("Plant", "/"), ("Alarms", "/alarms"), ("Compare", "/compare"))
-
-
-def load_style() -> None:
-    """Add the style sheet to all pages."""
-    ui.add_css(_STYLE, shared=True)
 
 
 def element(tag: str, css: str = "", **attributes: str) -> ui.element:
@@ -288,13 +273,7 @@ def table(titles: Iterable[str], rows: Iterable[Iterable[str]]) -> None:
 
 
 class EntryList:
-    """Values with their names and units; only changes are redrawn.
-
-    Parameters
-    ----------
-    empty : str
-        Text shown without values.
-    """
+    """Values with their names and units, or a text without values; only changes are redrawn."""
 
     def __init__(self, empty: str) -> None:
         self._empty = empty

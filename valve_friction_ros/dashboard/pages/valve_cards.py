@@ -19,7 +19,6 @@ from zoneinfo import ZoneInfo
 
 from nicegui import ui
 
-from valve_friction_ros.dashboard.alarm_list import RANGES
 from valve_friction_ros.dashboard.charts import (
     DRAG_TO_ZOOM,
     live_chart,
@@ -32,6 +31,7 @@ from valve_friction_ros.dashboard.charts import (
 from valve_friction_ros.dashboard.context import OfferedFile
 from valve_friction_ros.dashboard.live_state import Quantity, ValveView
 from valve_friction_ros.dashboard.live_strip import LiveStrip
+from valve_friction_ros.dashboard.pages.alarm_page import RANGES
 from valve_friction_ros.dashboard.pages.theme import (
     chip,
     element,
@@ -43,7 +43,7 @@ from valve_friction_ros.dashboard.pages.theme import (
     text,
 )
 from valve_friction_ros.dashboard.plant_rows import FRICTIONS, moment, quantity_texts
-from valve_friction_ros.health import AlarmEvent, Baseline
+from valve_friction_ros.health import AlarmEvent
 from valve_friction_ros.history import HistoryEntry, ValveHistory, drift_text
 from valve_friction_ros.outside_text import printable
 from valve_friction_ros.streams import utc_day
@@ -60,9 +60,7 @@ def draw_parameters(view: ValveView) -> None:
         return
     baseline = {one.name: one for one in view.baseline}
     with element("table", "vf-list vf-parameters"):
-        with element("thead"), element("tr"):
-            for title, css in _TITLES:
-                text("th", title, css)
+        table_head(*_TITLES)
         with element("tbody"):
             for one in view.parameters:
                 _draw_parameter(one)
@@ -92,13 +90,7 @@ _SIGNATURE_EVERY = 5
 
 
 class ValveSignals:
-    """Both charts of the signals; only changes are sent.
-
-    Parameters
-    ----------
-    strip : LiveStrip
-        The signals.
-    """
+    """Both charts of the signals; only changes are sent."""
 
     def __init__(self, strip: LiveStrip) -> None:
         self._strip = strip
@@ -195,11 +187,6 @@ def _trend_words(kept: ValveHistory) -> str:
 _MOST_ROWS = 60
 
 
-def baseline_words(baseline: Baseline | None) -> str:
-    """Return a baseline in words."""
-    return "none" if baseline is None else str(baseline)
-
-
 def _friction(entry: HistoryEntry) -> str:
     """Write the friction that was compared with the baseline, or another known friction."""
     ratio = entry.diagnosis.ratio
@@ -246,7 +233,7 @@ def draw_baselines(history: ValveHistory | None, zone: ZoneInfo) -> None:
     table(
         ("time", "new baseline", "previous baseline"),
         (
-            (moment(one.time, zone), *map(baseline_words, (one.in_force, one.replaced)))
+            (moment(one.time, zone), str(one.in_force or "none"), str(one.replaced or "none"))
             for one in reversed(history.baselines[-_MOST_ROWS:])
         ),
     )

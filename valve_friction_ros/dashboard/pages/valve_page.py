@@ -20,11 +20,10 @@ from valve_friction_ros.dashboard.context import (
     Answer,
     DashboardContext,
     OfferedFile,
-    Operator,
-    ServiceRequest,
     ValveFiles,
 )
 from valve_friction_ros.dashboard.live_state import Heard, Quantity, ValveView
+from valve_friction_ros.dashboard.live_strip import LiveStrip
 from valve_friction_ros.dashboard.pages.alarm_page import AlarmStates
 from valve_friction_ros.dashboard.pages.theme import (
     AnswerLine,
@@ -42,7 +41,6 @@ from valve_friction_ros.dashboard.pages.theme import (
 )
 from valve_friction_ros.dashboard.pages.valve_cards import (
     ValveSignals,
-    baseline_words,
     draw_alarms,
     draw_baselines,
     draw_files,
@@ -57,7 +55,7 @@ from valve_friction_ros.dashboard.plant_rows import (
     drift_number,
     interval_text,
     moment,
-    quantity_texts,
+    quantity_words,
     ratio_text,
     state_of,
     state_words,
@@ -68,18 +66,10 @@ from valve_friction_ros.outside_text import printable
 from valve_friction_ros.wording import lack_remedies
 
 
-class ValveHead:
-    """Name, state, diagnosis and main numbers of a valve.
+class _ValveHead:
+    """Name, state, diagnosis and main numbers of a valve."""
 
-    Parameters
-    ----------
-    page : Frame
-        The frame of the page.
-    is_live : bool
-        Whether valves are heard.
-    """
-
-    def __init__(self, page: Frame, is_live: bool = True) -> None:
+    def __init__(self, page: Frame, is_live: bool) -> None:
         self._page, self._is_live = page, is_live
         self._values: dict[str, ui.label] = {}
 
@@ -125,10 +115,10 @@ def _facts(view: ValveView, heard: Heard | None, page: Frame, is_live: bool) -> 
     made = view.identified
     age = "" if made is None else f"  ({ago(time.time() - made / 1e9)} ago)"
     facts = {
-        "friction": _with_unit(view.friction, f"N {FRICTIONS[view.friction.name]}"),
-        "baseline": _with_unit(view.healthy, "N"),
+        "friction": quantity_words(view.friction, f"N {FRICTIONS[view.friction.name]}"),
+        "baseline": quantity_words(view.healthy, "N"),
         "friction ÷ baseline": ratio,
-        "dead band": _with_unit(view.dead_band, "% of travel"),
+        "dead band": quantity_words(view.dead_band, "% of travel"),
         "drift": _drift_words(view),
         "identified": moment(made, page.zone) + age,
     }
@@ -143,16 +133,12 @@ def _fact(name: str) -> ui.label:
         return ui.label("").classes("vf-fact-value")
 
 
-def _with_unit(one: Quantity, unit: str) -> str:
-    return f"{' '.join(quantity_texts(one)).strip()} {unit}" if one.is_known else "–"
-
-
 def _drift_words(view: ValveView) -> str:
     if view.drift is None:
         return "–"
     words = f"{drift_number(view.drift)} N per month"
     expected = view.drift.expected
-    return f"{words}; limit {expected.date}" if expected else words
+    return f"{words}; limit {expected}" if expected else words
 
 
 def _selection_before() -> dict[str, str]:
@@ -170,12 +156,9 @@ _ACTIONS = {
 }
 
 
-def _size(one: Quantity) -> str:
-    return " ".join(filter(None, (one.name.replace("_", " "), *quantity_texts(one), one.unit)))
-
-
 def _frictions(found: tuple[Quantity, ...]) -> str:
-    return "; ".join(map(_size, found)) or "none"
+    words = (f"{one.name.replace('_', ' ')} {quantity_words(one)}" for one in found)
+    return "; ".join(words) or "none"
 
 
 class Question(NamedTuple):
@@ -210,32 +193,22 @@ def _estimate(view: ValveView) -> tuple[Quantity, ...]:
     return tuple(one for one in found if one.is_known)
 
 
-class ValveActions:
+class _ValveActions:
     """Buttons that call the services of one identifier, one call at a time.
 
-    Parameters
-    ----------
-    operator : Operator
-        Calls the services.
-    node : str
-        The identifier.
-    now : callable
-        Returns the present state of the valve.
-    replaced : callable
-        Returns in words the baseline that would be restored.
-    done : callable
-        Called with the name of a service after its answer.
+    `now` returns the present state of the valve, `replaced` the words for the baseline that would
+    be restored; `done` is called after each answer.
     """
 
     def __init__(
         self,
-        operator: Operator,
+        context: DashboardContext,
         node: str,
         now: Callable[[], ValveView],
         replaced: Callable[[], str],
-        done: Callable[[str], None],
+        done: Callable[[], None],
     ) -> None:
-        self._operator, self._node = operator, node
+        self._context, self._node = context, node
         self._now, self._replaced, self._done = now, replaced, done
         self._busy: tuple[str, float] | None = None
         self._buttons: list[ui.button] = []
@@ -324,7 +297,7 @@ class ValveActions:
             button.disable()
         self._answer.say("busy", f"{_ACTIONS[service][1]} …")
         try:
-            answer = await self._operator.call(self._node, ServiceRequest(service))
+            answer = await self._context.call(self._node, service)
         except Exception as error:  # noqa: BLE001 - a bug shall not leave the buttons dead
             answer = Answer(False, f"the call has failed: {error}")
         self._busy = None
@@ -333,7 +306,7 @@ class ValveActions:
         title = _ACTIONS[service][0].rstrip(" …")
         words = printable(answer.message, 2000) or "done"
         self._answer.say("ok" if answer.success else "error", f"{title}: {words}")
-        self._done(service)
+        self._done()
 
     def tick(self) -> None:
         """Show the duration of a call in progress."""
@@ -372,9 +345,11 @@ class _ValvePage:
         self._revision = -1
         self._beat = 0
         self._history: ValveHistory | None = None
-        self._head = ValveHead(page, context.is_live)
-        self._signals = ValveSignals(context.signals.watch(node))
-        ui.context.client.on_delete(lambda: context.signals.unwatch(node))
+        self._head = _ValveHead(page, context.is_live)
+        signals = context.signals
+        self._signals = ValveSignals(LiveStrip(60.0) if signals is None else signals.watch(node))
+        if signals is not None:
+            ui.context.client.on_delete(lambda: signals.unwatch(node))
 
     def _heard(self) -> Heard | None:
         return self._context.plant.valve(self._node, time.monotonic())
@@ -387,8 +362,8 @@ class _ValvePage:
         with element("article", "vf-valve"):
             with element("div", "vf-valve-head"):
                 self._head.draw()
-                self._actions = ValveActions(
-                    self._context.operator, self._node, self._view, self._replaced, self._answered
+                self._actions = _ValveActions(
+                    self._context, self._node, self._view, self._replaced, self._answered
                 )
                 if self._context.is_live and self._context.visitors.may_operate():
                     self._actions.draw()
@@ -518,9 +493,9 @@ class _ValvePage:
         kept = None if self._history is None else self._history.set_baseline
         if kept is None:
             return "what was in force before the last setting"
-        return baseline_words(kept.replaced)
+        return str(kept.replaced or "none")
 
-    def _answered(self, _service: str) -> None:
+    def _answered(self) -> None:
         self._revision = -1  # files and history may be new
 
 

@@ -41,8 +41,7 @@ from valve_friction_ros.dashboard import (
     Unread,
 )
 from valve_friction_ros.dashboard.accounts import Access, accounts_from
-from valve_friction_ros.dashboard.alarm_list import HistoryOperator
-from valve_friction_ros.dashboard.context import INSTALL, DashboardContext, GuardedOperator
+from valve_friction_ros.dashboard.context import INSTALL, DashboardContext
 from valve_friction_ros.dashboard.history_cache import HistoryCache
 from valve_friction_ros.dashboard.live_state import Sources
 from valve_friction_ros.dashboard.live_strip import LiveStrip
@@ -468,12 +467,7 @@ def _serve(node: Dashboard, limited: contextlib.ExitStack) -> int:
         return cannot_start(error)
     history = HistoryCache(options.history)
     context = DashboardContext(
-        options,
-        node.plant,
-        history,
-        GuardedOperator(HistoryOperator(history, node.calls), visitors, log),
-        node.signals,
-        visitors,
+        options, node.plant, history, visitors, log, node.calls.call, node.signals
     )
 
     def tell() -> None:

@@ -16,7 +16,7 @@ from collections.abc import Mapping, Sequence
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from rclpy.node import Node
 
-from valve_friction_ros.alerts import URL_VARIABLE, Alert, Secrets, Webhook
+from valve_friction_ros.alerts import URL_VARIABLE, Alert, Outbox, Secrets, Webhook
 from valve_friction_ros.health import (
     Alarm,
     AlarmKind,
@@ -122,9 +122,8 @@ class Alerts:
         level: Level,
         webhook: Webhook | None,
     ) -> None:
-        self._node, self._history, self._webhook = node, history, webhook
-        self._outbox, self._desk = workers.alerts.outbox(), workers.digest
-        self._outbox.address(webhook)
+        self._node, self._history, self._desk = node, history, workers.digest
+        self._outbox = None if webhook is None else workers.alerts.outbox(webhook)
         if (
             webhook is not None
             and (all_of := Secrets.from_environment()).going_to(webhook) != all_of
@@ -153,7 +152,7 @@ class Alerts:
 
         Problems of the alerts themselves raise the level afterwards, and are not posted.
         """
-        if self._webhook is None:
+        if self._outbox is None:
             return
         level = Level(status.level[0])
         if any(one.state.is_suppressed for one in alarms.values()):
@@ -168,16 +167,16 @@ class Alerts:
                 self._alert(status, level, leading_ratio(diagnosis, findings, level), alarms)
             )
             self._told, self._told_at = level, now
-        self._put_digest(alarms)
-        self._mark(status, str(self._webhook))
+        self._put_digest(self._outbox, alarms)
+        self._mark(status, self._outbox)
 
-    def _put_digest(self, alarms: Mapping[AlarmKind, Alarm]) -> None:
+    def _put_digest(self, outbox: Outbox, alarms: Mapping[AlarmKind, Alarm]) -> None:
         """Pass the alarms to the digest; the first valve for which it is due posts it for all."""
         hour = self._node.get_parameter("webhook_digest").value
         valve = self._history.valve.tag, self._node.get_fully_qualified_name()
-        letter = self._desk.hear(self._webhook, hour, valve, alarms, time.time())
+        letter = self._desk.hear(outbox.webhook, hour, valve, alarms, time.time())
         if letter is not None:
-            self._outbox.put(letter)
+            outbox.put(letter)
 
     def _keep(self, level: Level) -> None:
         if level != self._kept:
@@ -207,12 +206,12 @@ class Alerts:
             },
         )
 
-    def _mark(self, status: DiagnosticStatus, place: str) -> None:
-        state = self._outbox.state()
+    def _mark(self, status: DiagnosticStatus, outbox: Outbox) -> None:
+        state = outbox.state()
         if state.settled is not None:
             self._keep(state.settled)
         values = {
-            "webhook": place,
+            "webhook": str(outbox.webhook),
             "webhook delivered": str(state.delivered),
             "webhook waiting": str(state.waiting),
             "webhook given up": str(state.given_up),
