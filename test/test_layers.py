@@ -64,8 +64,7 @@ INNER = {
     "commands.demo": set(),
 }
 # The front door, and what every room may import.
-BESIDE = {"__init__", "__main__", "front_door", "loopback", "on_demand", "outside_text"}
-BESIDE |= {"page_template", "settings", "wording"}
+BESIDE = {"__init__", "__main__", "front_door", "on_demand", "outside_text", "settings", "wording"}
 ROS_ROOMS = ("nodes", "commands/demo")
 
 # The one arrow up: a result draws itself, and loads the figures when it is asked to.

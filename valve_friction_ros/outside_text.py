@@ -7,13 +7,17 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Text from outside: escaping for terminals and CSV, and suggestions for unknown names."""
+"""Text from outside: escaping for terminals, CSV and pages; unknown names; names of hosts."""
 
 import csv
 import difflib
 import io
+import ipaddress
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
 
 _LONGEST = 10_000
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")
@@ -49,6 +53,31 @@ def csv_text(header: Sequence[str], rows: Iterable[Mapping[str, Any]]) -> str:
 def as_read(cell: str) -> str:
     """Undo `harmless`."""
     return cell[1:] if cell.startswith("'") and _is_formula(cell) else cell
+
+
+def page_environment(package: str) -> "Environment":
+    """Return the environment of the templates in a package's folder; it escapes all they are given.
+
+    Pages alone need jinja2.
+    """
+    from jinja2 import Environment, PackageLoader, StrictUndefined  # noqa: PLC0415
+
+    return Environment(
+        loader=PackageLoader(package, "."),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+
+
+def is_loopback(host: str) -> bool:
+    """Return whether a host is a loopback address or ``localhost``."""
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"
 
 
 _MOST_NAMED = 12

@@ -54,25 +54,11 @@ class Derivatives(NamedTuple):
 def savgol_weights(
     window: int, order: int, degree: int = 0, sample_period: float = 1.0
 ) -> NDArray[np.float64]:
-    """Return the weights of a Savitzky–Golay filter, ready for convolution.
+    """Return the weights of a Savitzky–Golay filter over `window` samples, the last sample's first.
 
-    They equal those of `scipy.signal.savgol_coeffs`, whose import takes half a second.
-
-    Parameters
-    ----------
-    window : int
-        Length of the window, samples, above `order`.
-    order : int
-        Order of the polynomials.
-    degree : int
-        Order of the derivative in the middle of the window; 0 smooths.
-    sample_period : float
-        Time between two samples, s.
-
-    Returns
-    -------
-    ndarray of float, shape (window,)
-        The weights, the last sample's first.
+    Polynomials of an `order` below the window give the derivative of a `degree` in its middle; 0
+    smooths. The weights equal those of `scipy.signal.savgol_coeffs`, whose import takes half a
+    second.
     """
     # On the interval from −1 to 1 the powers stay well-conditioned for any window length.
     powers = np.vander(np.linspace(-1.0, 1.0, window), order + 1, increasing=True)
@@ -240,13 +226,6 @@ _RESIDUAL_GATE = 4.0
 by chance in 3 of 100,000 windows."""
 
 
-def _window_slopes(signal: NDArray[np.float64], window: int) -> NDArray[np.float64]:
-    """Return the slope per sample of the straight line through each window, by first sample."""
-    place = np.arange(window) - (window - 1) / 2
-    weights = (place / (place @ place))[::-1]
-    return np.asarray(np.convolve(signal, weights, "valid"), dtype=np.float64)
-
-
 def _peaks(signal: NDArray[np.float64], least: float, distance: int) -> NDArray[np.intp]:
     """Find local maxima of at least `least`; of those nearer than `distance`, keep the highest.
 
@@ -271,7 +250,7 @@ def _sharp_jumps(signal: NDArray[np.float64], noise: float, window: int) -> NDAr
     if signal.size < 4 * window:
         return np.empty(0, dtype=np.intp)
     place = np.arange(window) - (window - 1) / 2
-    slopes = _window_slopes(signal, window)
+    slopes = np.convolve(signal, (place / (place @ place))[::-1], "valid")  # of straight lines
     jump = np.abs(slopes[window:] - slopes[:-window]) / (noise * np.sqrt(2 / (place @ place)))
     peaks = _peaks(jump, _CORNER_GATE, window)
     before = jump[np.maximum(peaks - window, 0)]
@@ -457,26 +436,16 @@ _LONGEST_SMOOTHING = 0.5
 Where the signal bends, `longest_faithful_window` stops earlier. An absolute time."""
 
 
-class DriveSmoothing(NamedTuple):
-    """Smoothing of the drive, as far as its noise requires.
+def smoothing_of(
+    signal: NDArray[np.float64], noise: float, period: float
+) -> tuple[NDArray[np.intp], int]:
+    """Choose corners and window, in samples, to smooth a signal as far as its noise requires.
 
-    Attributes
-    ----------
-    corners : ndarray of int
-        Samples at which the slope of the drive jumps; smoothing takes place between them.
-    window : int
-        Smoothing window, samples; 1 for a noiseless drive.
+    The noise is white, with `period` s between samples. The window is 1 without noise.
     """
-
-    corners: NDArray[np.intp]
-    window: int
-
-
-def smoothing_of(signal: NDArray[np.float64], noise: float, period: float) -> DriveSmoothing:
-    """Choose corners and window for a signal with white noise, `period` s between samples."""
     corners = find_corners(signal, noise, max(round(_CORNER_TIME / period), _CORNER_SAMPLES))
     longest = max(round(_LONGEST_SMOOTHING / period), 1)
-    return DriveSmoothing(corners, longest_faithful_window(signal, corners, noise, longest))
+    return corners, longest_faithful_window(signal, corners, noise, longest)
 
 
 _LONGEST_DERIVATIVE_WINDOW = 1.0
@@ -509,14 +478,9 @@ class MeasuredRecord(Recording):
         return sensor_noise(self.drive)
 
     @cached_property
-    def drive_smoothing(self) -> DriveSmoothing:
-        """Corners of the drive, and the smoothing window between them."""
-        return smoothing_of(self.drive, self.drive_noise, self.sample_period)
-
-    @cached_property
     def smoothed_drive(self) -> NDArray[np.float64]:
         """The drive smoothed between its corners as far as its noise requires, shape (n,)."""
-        corners, window = self.drive_smoothing
+        corners, window = smoothing_of(self.drive, self.drive_noise, self.sample_period)
         return self.drive if window == 1 else smooth_between(self.drive, corners, window)
 
     @cached_property

@@ -115,11 +115,10 @@ class StrokeCounter:
     """Adds up the strokes between reversals.
 
     The stem has reversed once it has returned by more than the dead band from the farthest point of
-    its stroke. That point is the turning point. The distance is the sum of the strokes between
-    turning points, up to the farthest point of the present stroke. A signal that stays within the
-    dead band thus adds nothing, and the sums never decrease. Digital valve controllers have the
-    same travel accumulator and cycle counter, but here a stroke is added in full length once it
-    exceeds the dead band.
+    its stroke, its turning point. The distance is the sum of the strokes between turning points, up
+    to the farthest point of the present stroke. A signal within the dead band thus adds nothing.
+    The travel accumulators and cycle counters of digital valve controllers are alike, but here a
+    stroke is added in full length once it exceeds the dead band.
 
     Attributes
     ----------
@@ -132,10 +131,9 @@ class StrokeCounter:
     def __init__(self) -> None:
         self.distance = 0.0
         self.reversals = 0
-        self._direction = 0
-        self._low, self._high = math.inf, -math.inf
         self._farthest = 0.0
         """Farthest point of the present stroke, measured in its direction, m."""
+        self.begin_anew()
 
     def begin_anew(self) -> None:
         """Forget the position of the stem; the next position adds no distance."""
@@ -265,16 +263,16 @@ class SensorBand:
     for the sampling rate, so the lower quartile of the last blocks is used. The step of a converter
     is the smallest difference in blocks with many codes, or with values that flicker from sample to
     sample.
+
+    Attributes
+    ----------
+    band : float
+        The least dead band, m.
     """
 
     def __init__(self) -> None:
         self._noises: deque[float] = deque(maxlen=_MOST_SEEN)
-        self._step = self._band = 0.0
-
-    @property
-    def band(self) -> float:
-        """The least dead band, m."""
-        return self._band
+        self._step = self.band = 0.0
 
     def add(self, position: NDArray[np.float64]) -> None:
         """Process a block of positions, m, shape (n,)."""
@@ -284,7 +282,7 @@ class SensorBand:
         differences = np.sort(np.abs(np.diff(position, _DIFFERENCE_ORDER)))
         self._noises.append(float(differences[differences.size // 2]) / (MEDIAN_MAGNITUDE * _GAIN))
         noise = sorted(self._noises)[len(self._noises) // 4]
-        self._band = max(_BAND_NOISE * noise, _BAND_STEPS * self._step)
+        self.band = max(_BAND_NOISE * noise, _BAND_STEPS * self._step)
 
     def _follow_step(self, position: NDArray[np.float64]) -> None:
         first, middle, last = position[:-2], position[1:-1], position[2:]
@@ -667,9 +665,6 @@ def warned_limits(usage: ValveUsage, limits: UsageLimits) -> set[str]:
     for count, last in enumerate(days, 1):
         then = ValveUsage(tuple(days[:count]), usage.renewal)
         states = limit_states(then.since_renewal, then.pace(), limits, (last.day + 1) * DAY)
-        found |= {
-            one.name
-            for one in states
-            if one.is_reached or one.is_expected_within(LEAD + _DATE_DOUBT)
-        }
+        lead = LEAD + _DATE_DOUBT
+        found |= {one.name for one in states if one.is_reached or one.is_expected_within(lead)}
     return found

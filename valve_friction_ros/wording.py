@@ -18,127 +18,252 @@ import string
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timezone, tzinfo
-from enum import Enum, auto
+from enum import Enum, unique
 from typing import Any
 
 from valve_friction_ros.model.drive import Drive
 
+MORE_STROKES = (
+    "record more strokes, some fast and some slow, and set timing_uncertainty if the clocks and "
+    "lags of both signals are known"
+)
+"""Advice for a narrower interval of friction."""
 
+
+@unique
 class Code(Enum):
-    """Meaning of a statement."""
+    """Meaning of a statement; its value is the sentence, with a format for each fact."""
 
-    QUOTED = auto()
+    QUOTED = "{text}"
     """Text from outside or from a former version, verbatim."""
     # The diagnosis of the friction
-    COMPARED = auto()
-    COMPARED_AGAIN = auto()
-    FRICTION_BELOW_ZERO = auto()
-    MOVES_BELOW_ZERO = auto()
-    VANISHED = auto()
-    NOT_IDENTIFIABLE = auto()
-    NO_BASELINE = auto()
-    NOT_COMPARED = auto()
-    NOT_COMPARED_SPEED = auto()
-    NOT_COMPARED_LACKING = auto()
-    WAS_COMPARED = auto()
+    COMPARED = "{state:of state}: {what} is {ratio:figures} times {healthy}; {effect}"
+    COMPARED_AGAIN = (
+        "{state:of state}: {what} is {ratio:figures} times {healthy}; {effect}; identify it again "
+        "from a longer record with more strokes to be sure"
+    )
+    FRICTION_BELOW_ZERO = (
+        "{of:words} is {value,half_width:±} N, but friction cannot be negative: check the "
+        "direction of both signals"
+    )
+    MOVES_BELOW_ZERO = (
+        "{moves}, sliding friction is {value:.4g} N, but friction cannot be negative: check the "
+        "direction of both signals"
+    )
+    VANISHED = (
+        "friction collapsed, the packing may leak: {of:words} is too small to be identified (at "
+        "most {largest:.2g} N); its baseline is {healthy:.4g} N"
+    )
+    NOT_IDENTIFIABLE = "{of:words} is not identifiable: {reason}"
+    NO_BASELINE = "no baseline yet; {effect}{survey:of survey}"
+    NOT_COMPARED = "no comparison with the baseline ({baseline}): {reasons:list |; |}; {effect}"
+    NOT_COMPARED_SPEED = (
+        "the stem slid at {speed:in .2g mm/s} mm/s, but at {healthy:in .2g mm/s} mm/s in the "
+        "baseline, and friction between these speeds is not known well enough: move the stem as "
+        "for the baseline"
+    )
+    NOT_COMPARED_LACKING = "the baseline has no {of:words}: set it again"
+    WAS_COMPARED = "{what} was {ratio:figures} times its baseline{time:dated}"
     # Qualifications of a diagnosis
-    MISFIT = auto()
-    DOUBTED = auto()
-    SCALED = auto()
-    DATED = auto()
-    DATED_EARLIER = auto()
-    AGED = auto()
-    STANDS_UNCOMPARED = auto()
-    STANDS_UNCERTAIN = auto()
-    FAILED = auto()
-    NO_ESTIMATE = auto()
-    NOTHING_IDENTIFIED = auto()
-    REFUSED = auto()
-    REFUSED_REPEATEDLY = auto()
-    MEASURED_EARLIER = auto()
+    MISFIT = "the Karnopp model does not describe this valve (misfit {misfit:misfit})"
+    DOUBTED = "{doubt}; {of}"
+    SCALED = (
+        "friction and spring constant have changed by the same factor, which points to {scale}: "
+        "check both before working on the packing; {of}"
+    )
+    DATED = "{of}{time:dated}"
+    DATED_EARLIER = "{of} (identified earlier, {time:minute})"
+    AGED = "{of} (identified {age:ago}, before the restart)"
+    STANDS_UNCOMPARED = "{alarm}; the latest record cannot be compared: {latest}"
+    STANDS_UNCERTAIN = "{alarm}; the latest record does not clear it: {latest}"
+    FAILED = "{error}; previous result: {of}"
+    NO_ESTIMATE = "no estimate: {reason}"
+    NOTHING_IDENTIFIED = "nothing has been identified yet"
+    REFUSED = "the latest identification was refused: {reason}; previous result: {of}"
+    REFUSED_REPEATEDLY = "the latest {count} identifications were refused: {reason}"
+    MEASURED_EARLIER = "{of} (measured {time:minute}; not seen in any record since)"
     # Parts
-    FRICTION = auto()
-    FRICTION_AT = auto()
-    FRICTION_SIZE = auto()
-    DEAD_BAND = auto()
-    DEAD_BAND_INTERVAL = auto()
-    BASELINE = auto()
-    BASELINE_COULOMB = auto()
-    BASELINE_SLIDING = auto()
-    BASELINE_REMARK = auto()
-    SLIDING_SIZE = auto()
-    ITS_BASELINE = auto()
-    FIRST_MOVES = auto()
-    BEFORE_CHANGE = auto()
-    BY_MOVES = auto()
-    CHANGED = auto()
-    AREA_AND_SCALE = auto()
-    SCALE = auto()
-    POSITION_SCALE = auto()
+    FRICTION = "{of:words}"
+    FRICTION_AT = "{of:words} at {speed:in .2g mm/s} mm/s"
+    FRICTION_SIZE = "{of:words} {value,half_width:±} N"
+    DEAD_BAND = "the stem ignores reversals smaller than {share:percent} of its travel"
+    DEAD_BAND_INTERVAL = (
+        "; the stem ignores reversals smaller than {share,half_width:shares} % of its travel"
+    )
+    BASELINE = "{frictions:list |, |}"
+    BASELINE_COULOMB = "coulomb friction {value,half_width:±} N"
+    SLIDING_SIZE = "{value,half_width:±} N at {speed:in .3g mm/s} mm/s"
+    BASELINE_SLIDING = f"sliding friction {SLIDING_SIZE}"
+    BASELINE_REMARK = (
+        "it is known to ±{share:percent}: only growth to {least:.2g} times or more is certain to "
+        "be reported; " + MORE_STROKES
+    )
+    ITS_BASELINE = "its baseline"
+    FIRST_MOVES = (
+        "its value up to {time:minute}, when the moves of this valve were first combined "
+        "({has_baseline:?the baseline cannot be compared|no baseline}: call ~/set_baseline while "
+        "it is healthy)"
+    )
+    BEFORE_CHANGE = (
+        "its value before the change between {earliest:minute} and {latest:minute} (no baseline "
+        "and no earlier moves to compare with: call ~/set_baseline while it is healthy)"
+    )
+    BY_MOVES = "from {moves} moves in service since {since:minute}{dead_band}"
+    CHANGED = "{of}; the change occurred between {earliest:minute} and {latest:minute}"
+    AREA_AND_SCALE = "the scale of the {drive:drive} sensor and the diaphragm area"
+    SCALE = "the scale of the {drive:drive} sensor"
+    POSITION_SCALE = "the scale of the position sensor"
     # Evidence from the moves in service
-    UNTIL_BEFORE = auto()
-    BASELINE_WITHOUT_SLIDING = auto()
-    BASELINE_AT_OTHER_SPEED = auto()
+    UNTIL_BEFORE = "{of} (until {time:second}, before that identification)"
+    BASELINE_WITHOUT_SLIDING = (
+        "not compared with the baseline: it has no sliding friction, the only friction that moves "
+        "in service determine; call ~/set_baseline while the valve is healthy"
+    )
+    BASELINE_AT_OTHER_SPEED = (
+        "not compared with the baseline: it was taken at {healthy:in .2g mm/s} mm/s and the moves "
+        "at {speed:in .2g mm/s} mm/s, more than a factor of {factor:g} apart; call ~/set_baseline "
+        "while the valve is healthy"
+    )
     # Findings on the valve
-    COMMON_SCALE = auto()
-    SPRING_CHANGED = auto()
-    BALANCE_SHIFTED = auto()
-    BENCH_SET = auto()
-    DRIVE_ZERO = auto()
-    POSITION_ZERO = auto()
-    UNEVEN_PACKING = auto()
-    SLIP_GROWN = auto()
-    VISCOUS_CHANGED = auto()
-    ASYMMETRY_CHANGED = auto()
-    NOISE_GROWN = auto()
-    LAG_CHANGED = auto()
-    STOPS_MOVED_ALIKE = auto()
-    TRAVEL_LOST = auto()
-    STOP_MOVED_OUTWARD = auto()
-    STOOD_STILL = auto()
-    HELD_IN_TEST = auto()
+    COMMON_SCALE = (
+        "spring constant and friction have both changed to {change:times} the baseline: a common "
+        "factor points to {scale} rather than to spring and packing at once; {advice}"
+    )
+    SPRING_CHANGED = (
+        "the spring constant has changed{with_preload:? together with its preload}: {change:times} "
+        "the baseline, now {value:.4g} N/m: {advice}"
+    )
+    BALANCE_SHIFTED = (
+        "the force balance has shifted: spring preload {change:by N}, {share:percent} of the "
+        "spring's force over the travel; {advice}"
+    )
+    BENCH_SET = "the bench set"
+    DRIVE_ZERO = "the zero of the {drive:drive} sensor ({reading:+.3g} {unit})"
+    POSITION_ZERO = "the zero of the position sensor ({reading:in +.2g mm} mm){stops:of stops}"
+    UNEVEN_PACKING = "packing with more friction {upward:?up|down}ward"
+    SLIP_GROWN = (
+        "the slip jump has grown: static friction exceeds sliding friction by {change:by N} more "
+        "than in the baseline, and the stem jumps by {share:percent} of its travel; {advice}"
+    )
+    VISCOUS_CHANGED = (
+        "viscous friction has {grown:?grown|fallen} to {change:times} the baseline: {advice}; a "
+        "change in lag between the signals would look similar"
+    )
+    ASYMMETRY_CHANGED = (
+        "viscous friction has grown {upward:?up|down}ward (share {change:by}): {advice}"
+    )
+    NOISE_GROWN = (
+        "the noise of the {signal:of signal} has grown to {change:times} the baseline: {advice}"
+    )
+    LAG_CHANGED = (
+        "the lag of the stem behind the {drive:drive} has {later:?grown|shrunk}, {change:by ms}: "
+        "{advice}; a change in viscous friction would look similar"
+    )
+    STOPS_MOVED_ALIKE = (
+        "both travel stops have shifted by {change:by mm}: the zero of the position sensor or its "
+        "coupling to the stem has shifted; {advice}"
+    )
+    TRAVEL_LOST = (
+        "travel is lost at the {stop:of end}: the stem stops {change:by mm} from its former stop; "
+        "{advice}"
+    )
+    STOP_MOVED_OUTWARD = (
+        "the travel stop at the {stop:of end} has moved outward by {change:by mm}: {advice}"
+    )
+    STOOD_STILL = (
+        "the stem has not moved from {position:in .1f mm} mm since {since:minute} although its "
+        "{drive:drive} changed by {change:.3g} {unit}: it is held by more than {ratio:.2g} times "
+        "the friction of the baseline, by a part in the trim or by a lock, or the position sensor "
+        "has failed; {advice}"
+    )
+    HELD_IN_TEST = (
+        "the stem stayed at {position:in .1f mm} mm in a test although the force should have moved "
+        "it: static friction is at least {friction:.0f} N, {ratio:.2f} times the friction of the "
+        "baseline, or the stem is blocked; {advice}"
+    )
     # The samples of a valve
-    BUFFER_CLEARED = auto()
-    CLEARED_ON_REQUEST = auto()
-    CLEARED_AS_SETTINGS = auto()
-    CLEARED_AS_RECORD_BEGINS = auto()
-    CLEARED_AS_STAMPS_GO_BACK = auto()
-    STAMPS_WENT_BACK = auto()
-    TIME_JUMPED = auto()
-    TIME_JUMPS = auto()
-    SAMPLE_DAMAGED = auto()
-    SAMPLE_NO_JOINT = auto()
-    SAMPLE_NOT_FINITE = auto()
-    SAMPLE_OUT_OF_RANGE = auto()
-    SAMPLE_REPEATED = auto()
-    SAMPLE_OVERTAKEN = auto()
-    SAMPLE_BACK = auto()
-    SENSOR_RANGE = auto()
-    ANY_VALVE_RANGE = auto()
-    DATA_FAULT = auto()
-    OUTSIDE_TRAVEL = auto()
-    STAMPS_APART = auto()
-    STAMPS_OFF_CLOCK = auto()
-    REJECTED = auto()
-    REJECTED_FOR = auto()
-    REJECTED_WITHOUT_JOINT = auto()
-    PRESSURE_OUT_OF_RANGE = auto()
-    POSITION_OUT_OF_RANGE = auto()
-    NONE_USABLE = auto()
-    LAST_USABLE = auto()
+    BUFFER_CLEARED = "{because}: the buffer was cleared"
+    CLEARED_ON_REQUEST = "on request"
+    CLEARED_AS_SETTINGS = "valve or window parameters were changed"
+    CLEARED_AS_RECORD_BEGINS = "a new record begins"
+    CLEARED_AS_STAMPS_GO_BACK = "time stamps go backwards: the buffer is cleared"
+    STAMPS_WENT_BACK = "the time stamps of {signal} jumped back by {seconds:.3g} s"
+    TIME_JUMPED = "ROS time jumped by {seconds:.3g} s"
+    TIME_JUMPS = "ROS time jumps"
+    SAMPLE_DAMAGED = "{signal} is damaged"
+    SAMPLE_NO_JOINT = "{signal} has no position for the joint"
+    SAMPLE_NOT_FINITE = "{signal} is not finite"
+    SAMPLE_OUT_OF_RANGE = "{signal} outside {span}"
+    SAMPLE_REPEATED = "{signal} repeats a time stamp"
+    SAMPLE_OVERTAKEN = (
+        "{signal} arrived out of order: its time stamp is slightly before the last one"
+    )
+    SAMPLE_BACK = "{signal} returned in time"
+    SENSOR_RANGE = "the sensor's range {lowest:g} to {highest:g} Pa"
+    ANY_VALVE_RANGE = "the range of any valve, {lowest:g} to {highest:g} m"
+    DATA_FAULT = "{signal:or the stamps}: {cause:of}{cause:?, |}{kind:of}"
+    OUTSIDE_TRAVEL = (
+        "stem_state: {share:rounded} of its samples lie outside the travel of 0 to {travel:.4g} m, "
+        "for example {reading:.4g} m: check unit (m), zero and travel{question:after : }"
+    )
+    STAMPS_APART = (
+        "stem_state is stamped {seconds:.3g} s {is_ahead:?later|earlier} than actuator_pressure: "
+        "synchronise the clocks of both sensors, and check for transmission delays"
+    )
+    STAMPS_OFF_CLOCK = (
+        "the time stamps of {signal:or both inputs} are {seconds:.3g} s {is_ahead:?ahead "
+        "of|behind} the clock of this node: synchronise the clocks; for a recording, set "
+        "use_sim_time and play it with --clock, or set clock_tolerance to 0"
+    )
+    REJECTED = "{signal}: {share:rounded} of its samples are rejected{usable:after , }: {why}"
+    REJECTED_FOR = "{cause:of rejected}"
+    REJECTED_WITHOUT_JOINT = (
+        "no position for the joint{joint:quoted}: name it in the messages, or set joint"
+    )
+    PRESSURE_OUT_OF_RANGE = (
+        "{reading:.4g} Pa is outside the sensor's range {lowest:g} to {highest:g} Pa: check sensor "
+        "and unit (Pa), or correct pressure_minimum and pressure_maximum"
+    )
+    POSITION_OUT_OF_RANGE = (
+        "{reading:.4g} m is outside the range of any valve, up to {highest:g} m: check sensor and "
+        "unit (m)"
+    )
+    NONE_USABLE = "no usable sample yet"
+    LAST_USABLE = "last usable sample {seconds:.0f} s ago"
     # Response to the command
-    STEPS_IGNORED = auto()
-    ANSWER_LATE = auto()
-    ANSWER_SLOW = auto()
-    RESTS_AWAY = auto()
-    HUNTS = auto()
-    COMMANDS_UNUSABLE = auto()
+    STEPS_IGNORED = (
+        "the stem ignored {number} of the latest {steps} command steps of {least:percent} of the "
+        "travel or more: {cause:of cause}"
+    )
+    ANSWER_LATE = (
+        "the stem starts to move {median:.2g} s after its command (median of {moves} moves, limit "
+        "{limit:g} s): {cause:of cause}"
+    )
+    ANSWER_SLOW = (
+        "the stem reaches 86 % of its move {median:.2g} s after its command (median of {moves} "
+        "moves, limit {limit:g} s): {cause:of cause}"
+    )
+    RESTS_AWAY = (
+        "the stem settles {median:percent} of its travel away from its command (median of {moves} "
+        "moves, limit {limit:percent}): {cause:of cause}"
+    )
+    HUNTS = (
+        "the stem hunts by {amplitude:percent} of its travel every {period:.2g} s at a constant "
+        "command: {cause:of cause}"
+    )
+    COMMANDS_UNUSABLE = "no command on stem_command can be used: {problem}"
     # The life of the packing
-    PACKING_TRAVEL = auto()
-    PACKING_REVERSALS = auto()
-    LIMIT_REACHED = auto()
-    LIMIT_EXPECTED = auto()
-    LIMIT_NEAR = auto()
+    PACKING_TRAVEL = (
+        "packing life: {used:.4g} m of {limit:.6g} m travelled (travel_limit){state}: replace the "
+        "packing, then call ~/reset_usage"
+    )
+    PACKING_REVERSALS = (
+        "packing life: {used:.0f} of {limit:.6g} reversals (reversal_limit){state}: replace the "
+        "packing, then call ~/reset_usage"
+    )
+    LIMIT_REACHED = ": reached"
+    LIMIT_EXPECTED = ", expected on {expected:day}"
+    LIMIT_NEAR = ", close to its limit (previously warned)"
 
 
 @dataclass(frozen=True)
@@ -213,7 +338,7 @@ def _restored(fact: Any) -> Any:
 def sentence(statement: Statement) -> str:
     """Write a statement, without a full stop."""
     facts = {**statement.facts, "advice": _advice(statement)}
-    return _WRITER.vformat(_SENTENCES[statement.code], (), facts)
+    return _WRITER.vformat(statement.code.value, (), facts)
 
 
 def _advice(statement: Statement) -> str:
@@ -228,7 +353,7 @@ def finding_advice(statement: Statement) -> str:
 
 def headline(statement: Statement) -> str:
     """Write a statement without its figures, for a cell of a table."""
-    template = _HEADLINES.get(statement.code) or _SENTENCES[statement.code]
+    template = _HEADLINES.get(statement.code) or statement.code.value
     return _WRITER.vformat(template, (), statement.facts)
 
 
@@ -306,11 +431,6 @@ def utc_second(stamp: float) -> str:
     return f"{utc(stamp):%Y-%m-%dT%H:%M:%SZ}"
 
 
-def member_words(member: Enum, table: str) -> str:
-    """Write an enum member in the words of a table."""
-    return _member(member.name, table)
-
-
 def words(name: str) -> str:
     """Write the name of a number in words."""
     return name.replace("_", " ")
@@ -340,11 +460,7 @@ def played_test_words(why: str, found: float, limit: float) -> str:
     return _ABORTS[why].format(time, limit)
 
 
-_SUPPORTS = {
-    "POSITIVE": "somewhat",
-    "STRONG": "strongly",
-    "VERY_STRONG": "very strongly",
-}
+_SUPPORTS = {"POSITIVE": "somewhat", "STRONG": "strongly", "VERY_STRONG": "very strongly"}
 
 
 def evidence_ratio_words(
@@ -384,12 +500,11 @@ _LACKS = {
     "PRECISION": "{of} is known to ±{share}, but a baseline requires ±{largest}",
     "HEALTH": "the valve is in alarm, and a new baseline could hide the cause",
 }
-_LACKS_OF_MOVES = "friction from moves in service"
 
 
 def lack_words(of: str, lack: str, share: float, largest: float) -> str:
     """Write what a baseline lacks; `lack` is the name of a `Lack`."""
-    name = _LACKS_OF_MOVES if of == "moves" else words(of)
+    name = "friction from moves in service" if of == "moves" else words(of)
     known = {"share": share, "largest": largest}
     shares = {key: "–" if math.isnan(one) else percentage(one) for key, one in known.items()}
     return _LACKS[lack].format(of=name, **shares)
@@ -420,9 +535,9 @@ def lack_remedies(lacks: Sequence[tuple[str, str]]) -> tuple[str, ...]:
     return tuple(dict.fromkeys([*found, *waits]))
 
 
-def _member(name: str | None, table: str) -> str:
-    """Write an enum member by name, even if a stored statement names a member removed since."""
-    return "" if name is None else _TABLES[table].get(name, words(name.lower()))
+def member_words(name: str | None, table: str) -> str:
+    """Write an enum member in the words of a table; one that it does not have, by its name."""
+    return "" if name is None else _TABLES.get(table, {}).get(name, words(name.lower()))
 
 
 def _ago(age: int) -> str:
@@ -473,14 +588,12 @@ _FORMATS: dict[str, Callable[[Any, str], str]] = {
     "headline": lambda one, _: headline(one),
     "dated": lambda time, _: "" if time is None else f" (identified {utc_minute(time)})",
     "in": _in_unit,
-    "misfit": lambda one, _: (
-        f"{1e6 * one[0]:.3g} µm" if one[1] == "m" else f"{one[0]:.3g} {one[1]}"
-    ),
+    "misfit": lambda one, _: misfit_words(*one),
     "±": lambda one, _: with_width(one[0], one[1] or 0.0),
     "shares": lambda one, _: with_width(100.0 * one[0], 100.0 * one[1]),
     "list": _listed,
     "minute": lambda time, _: utc_minute(time),
-    "of": _member,
+    "of": member_words,
     "or": lambda known, other: other if known is None else str(known),
     "after": lambda known, mark: "" if known is None else f"{mark}{known}",
     "quoted": lambda name, _: "" if name is None else f" '{name}'",
@@ -527,21 +640,6 @@ _TABLES: dict[str, Mapping[str, str]] = {
         "FALLEN": "friction has fallen",
         "COLLAPSED": "friction collapsed, the packing may leak",
     },
-    "fault": {
-        "REJECTED": "rejected",
-        "OUTSIDE_TRAVEL": "outside travel",
-        "SKEW": "skew",
-        "CLOCK": "clock",
-    },
-    "sample_fault": {
-        "DAMAGED": "damaged, ",
-        "NO_JOINT": "no joint, ",
-        "NOT_FINITE": "not finite, ",
-        "OUT_OF_RANGE": "out of range, ",
-        "REPEATED": "repeated, ",
-        "OVERTAKEN": "overtaken, ",
-        "BACK": "back, ",
-    },
     "rejected": {
         "DAMAGED": "the messages are damaged: check the publisher",
         "NOT_FINITE": "the values are not finite: check sensor, cable and driver",
@@ -586,178 +684,6 @@ _TABLES: dict[str, Mapping[str, str]] = {
     },
 }
 """Words for enum members and names, by table."""
-
-MORE_STROKES = (
-    "record more strokes, some fast and some slow, and set timing_uncertainty if the clocks and "
-    "lags of both signals are known"
-)
-"""Advice for a narrower interval of friction."""
-
-_SLIDING_SIZE = "{value,half_width:±} N at {speed:in .3g mm/s} mm/s"
-_HEALTHY = "call ~/set_baseline while it is healthy"
-_SET_BASELINE = "call ~/set_baseline while the valve is healthy"
-
-_SENTENCES = {
-    Code.QUOTED: "{text}",
-    Code.COMPARED: "{state:of state}: {what} is {ratio:figures} times {healthy}; {effect}",
-    Code.COMPARED_AGAIN: "{state:of state}: {what} is {ratio:figures} times {healthy}; {effect}; "
-    "identify it again from a longer record with more strokes to be sure",
-    Code.FRICTION_BELOW_ZERO: "{of:words} is {value,half_width:±} N, but friction cannot be "
-    "negative: check the direction of both signals",
-    Code.MOVES_BELOW_ZERO: "{moves}, sliding friction is {value:.4g} N, but friction cannot be "
-    "negative: check the direction of both signals",
-    Code.VANISHED: "friction collapsed, the packing may leak: {of:words} is too small to be "
-    "identified (at most {largest:.2g} N); its baseline is {healthy:.4g} N",
-    Code.NOT_IDENTIFIABLE: "{of:words} is not identifiable: {reason}",
-    Code.NO_BASELINE: "no baseline yet; {effect}{survey:of survey}",
-    Code.NOT_COMPARED: "no comparison with the baseline ({baseline}): {reasons:list |; |}; "
-    "{effect}",
-    Code.NOT_COMPARED_SPEED: "the stem slid at {speed:in .2g mm/s} mm/s, but at {healthy:in .2g "
-    "mm/s} mm/s in the baseline, and friction between these speeds is "
-    "not known well enough: move the stem as for the baseline",
-    Code.NOT_COMPARED_LACKING: "the baseline has no {of:words}: set it again",
-    Code.WAS_COMPARED: "{what} was {ratio:figures} times its baseline{time:dated}",
-    Code.MISFIT: "the Karnopp model does not describe this valve (misfit {misfit:misfit})",
-    Code.DOUBTED: "{doubt}; {of}",
-    Code.SCALED: "friction and spring constant have changed by the same factor, which points to "
-    "{scale}: check both before working on the packing; {of}",
-    Code.DATED: "{of}{time:dated}",
-    Code.DATED_EARLIER: "{of} (identified earlier, {time:minute})",
-    Code.AGED: "{of} (identified {age:ago}, before the restart)",
-    Code.STANDS_UNCOMPARED: "{alarm}; the latest record cannot be compared: {latest}",
-    Code.STANDS_UNCERTAIN: "{alarm}; the latest record does not clear it: {latest}",
-    Code.FAILED: "{error}; previous result: {of}",
-    Code.NO_ESTIMATE: "no estimate: {reason}",
-    Code.NOTHING_IDENTIFIED: "nothing has been identified yet",
-    Code.REFUSED: "the latest identification was refused: {reason}; previous result: {of}",
-    Code.REFUSED_REPEATEDLY: "the latest {count} identifications were refused: {reason}",
-    Code.MEASURED_EARLIER: "{of} (measured {time:minute}; not seen in any record since)",
-    Code.FRICTION: "{of:words}",
-    Code.FRICTION_AT: "{of:words} at {speed:in .2g mm/s} mm/s",
-    Code.FRICTION_SIZE: "{of:words} {value,half_width:±} N",
-    Code.DEAD_BAND: "the stem ignores reversals smaller than {share:percent} of its travel",
-    Code.ITS_BASELINE: "its baseline",
-    Code.FIRST_MOVES: "its value up to {time:minute}, when the moves of this valve were first "
-    "combined ({has_baseline:?the baseline cannot be compared|no "
-    "baseline}: " + _HEALTHY + ")",
-    Code.BEFORE_CHANGE: "its value before the change between {earliest:minute} and "
-    "{latest:minute} (no baseline and no earlier moves to compare "
-    "with: " + _HEALTHY + ")",
-    Code.DEAD_BAND_INTERVAL: "; the stem ignores reversals smaller than "
-    "{share,half_width:shares} % of its travel",
-    Code.BASELINE: "{frictions:list |, |}",
-    Code.BASELINE_COULOMB: "coulomb friction {value,half_width:±} N",
-    Code.BASELINE_SLIDING: f"sliding friction {_SLIDING_SIZE}",
-    Code.SLIDING_SIZE: _SLIDING_SIZE,
-    Code.BASELINE_REMARK: "it is known to ±{share:percent}: only growth to {least:.2g} times or "
-    "more is certain to be reported; " + MORE_STROKES,
-    Code.BY_MOVES: "from {moves} moves in service since {since:minute}{dead_band}",
-    Code.CHANGED: "{of}; the change occurred between {earliest:minute} and {latest:minute}",
-    Code.AREA_AND_SCALE: "the scale of the {drive:drive} sensor and the diaphragm area",
-    Code.SCALE: "the scale of the {drive:drive} sensor",
-    Code.POSITION_SCALE: "the scale of the position sensor",
-    Code.UNTIL_BEFORE: "{of} (until {time:second}, before that identification)",
-    Code.BASELINE_WITHOUT_SLIDING: "not compared with the baseline: it has no sliding friction, "
-    "the only friction that moves in service "
-    "determine; " + _SET_BASELINE,
-    Code.BASELINE_AT_OTHER_SPEED: "not compared with the baseline: it was taken at {healthy:in "
-    ".2g mm/s} mm/s and the moves at {speed:in .2g mm/s} mm/s, more "
-    "than a factor of {factor:g} apart; " + _SET_BASELINE,
-    Code.COMMON_SCALE: "spring constant and friction have both changed to {change:times} the "
-    "baseline: a common factor points to {scale} rather than to spring and "
-    "packing at once; {advice}",
-    Code.SPRING_CHANGED: "the spring constant has changed{with_preload:? together with its "
-    "preload}: {change:times} the baseline, now {value:.4g} N/m: {advice}",
-    Code.BALANCE_SHIFTED: "the force balance has shifted: spring preload {change:by N}, "
-    "{share:percent} of the spring's force over the travel; {advice}",
-    Code.BENCH_SET: "the bench set",
-    Code.DRIVE_ZERO: "the zero of the {drive:drive} sensor ({reading:+.3g} {unit})",
-    Code.POSITION_ZERO: "the zero of the position sensor ({reading:in +.2g mm} mm){stops:of stops}",
-    Code.UNEVEN_PACKING: "packing with more friction {upward:?up|down}ward",
-    Code.SLIP_GROWN: "the slip jump has grown: static friction exceeds sliding friction by "
-    "{change:by N} more than in the baseline, and the stem jumps by "
-    "{share:percent} of its travel; {advice}",
-    Code.VISCOUS_CHANGED: "viscous friction has {grown:?grown|fallen} to {change:times} the "
-    "baseline: {advice}; a change in lag between the signals would look similar",
-    Code.ASYMMETRY_CHANGED: "viscous friction has grown {upward:?up|down}ward (share "
-    "{change:by}): {advice}",
-    Code.NOISE_GROWN: "the noise of the {signal:of signal} has grown to {change:times} the "
-    "baseline: {advice}",
-    Code.LAG_CHANGED: "the lag of the stem behind the {drive:drive} has {later:?grown|shrunk}, "
-    "{change:by ms}: {advice}; a change in viscous friction would look similar",
-    Code.STOPS_MOVED_ALIKE: "both travel stops have shifted by {change:by mm}: the zero of the "
-    "position sensor or its coupling to the stem has shifted; {advice}",
-    Code.TRAVEL_LOST: "travel is lost at the {stop:of end}: the stem stops {change:by mm} from "
-    "its former stop; {advice}",
-    Code.STOP_MOVED_OUTWARD: "the travel stop at the {stop:of end} has moved outward by "
-    "{change:by mm}: {advice}",
-    Code.STOOD_STILL: "the stem has not moved from {position:in .1f mm} mm since {since:minute} "
-    "although its {drive:drive} changed by {change:.3g} {unit}: it is held by "
-    "more than {ratio:.2g} times the friction of the baseline, by a part in the "
-    "trim or by a lock, or the position sensor has failed; {advice}",
-    Code.HELD_IN_TEST: "the stem stayed at {position:in .1f mm} mm in a test although the force "
-    "should have moved it: static friction is at least {friction:.0f} N, "
-    "{ratio:.2f} times the friction of the baseline, or the stem is blocked; "
-    "{advice}",
-    Code.BUFFER_CLEARED: "{because}: the buffer was cleared",
-    Code.CLEARED_ON_REQUEST: "on request",
-    Code.CLEARED_AS_SETTINGS: "valve or window parameters were changed",
-    Code.CLEARED_AS_RECORD_BEGINS: "a new record begins",
-    Code.CLEARED_AS_STAMPS_GO_BACK: "time stamps go backwards: the buffer is cleared",
-    Code.STAMPS_WENT_BACK: "the time stamps of {signal} jumped back by {seconds:.3g} s",
-    Code.TIME_JUMPED: "ROS time jumped by {seconds:.3g} s",
-    Code.TIME_JUMPS: "ROS time jumps",
-    Code.SAMPLE_DAMAGED: "{signal} is damaged",
-    Code.SAMPLE_NO_JOINT: "{signal} has no position for the joint",
-    Code.SAMPLE_NOT_FINITE: "{signal} is not finite",
-    Code.SAMPLE_OUT_OF_RANGE: "{signal} outside {span}",
-    Code.SAMPLE_REPEATED: "{signal} repeats a time stamp",
-    Code.SAMPLE_OVERTAKEN: "{signal} arrived out of order: its time stamp is slightly before the "
-    "last one",
-    Code.SAMPLE_BACK: "{signal} returned in time",
-    Code.SENSOR_RANGE: "the sensor's range {lowest:g} to {highest:g} Pa",
-    Code.ANY_VALVE_RANGE: "the range of any valve, {lowest:g} to {highest:g} m",
-    Code.DATA_FAULT: "{signal:or the stamps}: {cause:of sample_fault}{kind:of fault}",
-    Code.OUTSIDE_TRAVEL: "stem_state: {share:rounded} of its samples lie outside the travel of 0 "
-    "to {travel:.4g} m, for example {reading:.4g} m: check unit (m), zero "
-    "and travel{question:after : }",
-    Code.STAMPS_APART: "stem_state is stamped {seconds:.3g} s {is_ahead:?later|earlier} than "
-    "actuator_pressure: synchronise the clocks of both sensors, and check for "
-    "transmission delays",
-    Code.STAMPS_OFF_CLOCK: "the time stamps of {signal:or both inputs} are {seconds:.3g} s "
-    "{is_ahead:?ahead of|behind} the clock of this node: synchronise the "
-    "clocks; for a recording, set use_sim_time and play it with --clock, "
-    "or set clock_tolerance to 0",
-    Code.REJECTED: "{signal}: {share:rounded} of its samples are rejected{usable:after , }: {why}",
-    Code.REJECTED_FOR: "{cause:of rejected}",
-    Code.REJECTED_WITHOUT_JOINT: "no position for the joint{joint:quoted}: name it in the "
-    "messages, or set joint",
-    Code.PRESSURE_OUT_OF_RANGE: "{reading:.4g} Pa is outside the sensor's range {lowest:g} to "
-    "{highest:g} Pa: check sensor and unit (Pa), or correct pressure_minimum and pressure_maximum",
-    Code.POSITION_OUT_OF_RANGE: "{reading:.4g} m is outside the range of any valve, up to "
-    "{highest:g} m: check sensor and unit (m)",
-    Code.NONE_USABLE: "no usable sample yet",
-    Code.LAST_USABLE: "last usable sample {seconds:.0f} s ago",
-    Code.STEPS_IGNORED: "the stem ignored {number} of the latest {steps} command steps of "
-    "{least:percent} of the travel or more: {cause:of cause}",
-    Code.ANSWER_LATE: "the stem starts to move {median:.2g} s after its command (median of "
-    "{moves} moves, limit {limit:g} s): {cause:of cause}",
-    Code.ANSWER_SLOW: "the stem reaches 86 % of its move {median:.2g} s after its command (median "
-    "of {moves} moves, limit {limit:g} s): {cause:of cause}",
-    Code.RESTS_AWAY: "the stem settles {median:percent} of its travel away from its command "
-    "(median of {moves} moves, limit {limit:percent}): {cause:of cause}",
-    Code.HUNTS: "the stem hunts by {amplitude:percent} of its travel every {period:.2g} s at a "
-    "constant command: {cause:of cause}",
-    Code.COMMANDS_UNUSABLE: "no command on stem_command can be used: {problem}",
-    Code.PACKING_TRAVEL: "packing life: {used:.4g} m of {limit:.6g} m travelled "
-    "(travel_limit){state}: replace the packing, then call ~/reset_usage",
-    Code.PACKING_REVERSALS: "packing life: {used:.0f} of {limit:.6g} reversals "
-    "(reversal_limit){state}: replace the packing, then call "
-    "~/reset_usage",
-    Code.LIMIT_REACHED: ": reached",
-    Code.LIMIT_EXPECTED: ", expected on {expected:day}",
-    Code.LIMIT_NEAR: ", close to its limit (previously warned)",
-}
 
 _HEADLINES = {
     Code.COMPARED: "{state:of state}",

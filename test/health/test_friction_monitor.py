@@ -78,11 +78,10 @@ def feed(monitor, record, but=()):
         assert monitor.buffer.add_position(START + step * period, position) is None
 
 
-class TestSettings:
-    @pytest.mark.parametrize("value", [0.0, -1.0, math.nan, math.inf])
-    def test_impossible_windows_are_named(self, value):
-        with pytest.raises(ValueError, match=r"^window must be"):
-            replaced(window=value)
+@pytest.mark.parametrize("value", [0.0, -1.0, math.nan, math.inf])
+def test_impossible_windows_are_named(value):
+    with pytest.raises(ValueError, match=r"^window must be"):
+        replaced(window=value)
 
 
 class TestRefusalsInARow:
@@ -200,7 +199,7 @@ class TestIdentification:
 
 
 class TestMemory:
-    def test_at_first(self):
+    def test_before_any_estimate_and_from_the_first_on(self, result):
         monitor = FrictionMonitor(SETTINGS)
         remembered = (monitor.result, monitor.stamp, monitor.refusal, monitor.baseline)
         assert remembered == (None, None, None, None)
@@ -208,17 +207,12 @@ class TestMemory:
         assert (diagnosis.level, diagnosis.status_signal) == (Level.OK, StatusSignal.GOOD)
         assert diagnosis.ratio is None
         assert diagnosis.message == "no estimate: nothing has been identified yet"
-
-    def test_a_refusal_before_any_estimate(self):
-        monitor = FrictionMonitor(SETTINGS)
         monitor.refuse(RefusalError("the stem did not move"))
         assert monitor.refusal == "the stem did not move"
-        assert monitor.diagnosis().level == Level.OK
-        assert monitor.diagnosis().message == "no estimate: the stem did not move"
-
-    def test_an_estimate_ends_the_refusal(self, result):
-        monitor = FrictionMonitor(SETTINGS)
-        monitor.refuse(RefusalError("the stem did not move"))
+        assert str(monitor.diagnosis()) == "unknown: no estimate: the stem did not move"
+        monitor.fail("a bug")
+        failed = "ERROR: a bug; previous result: no estimate: the stem did not move"
+        assert str(monitor.diagnosis()) == failed
         monitor.accept(result, START)
         assert (monitor.result, monitor.stamp) == (result, START)
         assert monitor.refusal is None
@@ -234,10 +228,6 @@ class TestMemory:
         verdict = diagnose(result, BENCH_VALVE, monitor.baseline)
         refused = said(Code.REFUSED, reason="the stem did not move", of=verdict.statement)
         assert monitor.diagnosis() == dataclasses.replace(verdict, statement=refused)
-        assert monitor.diagnosis().message == (
-            "the latest identification was refused: the stem did not move; previous result: "
-            + verdict.message
-        )
 
 
 class TestInternalError:
@@ -260,14 +250,6 @@ class TestInternalError:
         monitor.accept(result, START + 1)
         assert monitor.internal_error is None
         assert monitor.diagnosis() == good
-
-    def test_before_any_estimate(self):
-        monitor = FrictionMonitor(SETTINGS)
-        monitor.fail("internal error: a bug")
-        assert monitor.diagnosis().level == Level.ERROR
-        assert monitor.diagnosis().message == (
-            "internal error: a bug; previous result: no estimate: nothing has been identified yet"
-        )
 
     def test_an_alarm_stays(self, result):
         monitor = compared_with(Baseline(coulomb_friction(result).value / 3))
@@ -305,7 +287,6 @@ class TestBaseline:
         with pytest.raises(RefusalError, match=text):
             monitor.result_as_baseline()
         assert monitor.baseline_lacks() == (BaselineLack("result", Lack.RESULT),)
-        assert monitor.baseline is None
 
     @pytest.mark.parametrize("name", ["coulomb_friction", "sliding_friction"])
     def test_needs_a_friction(self, with_values, name):
@@ -327,10 +308,10 @@ class TestBaseline:
         monitor.accept(with_values(**nothing), START)
         with pytest.raises(RefusalError) as refusal:
             monitor.result_as_baseline()
+        why = "is not identifiable (the record does not determine it)"
         assert str(refusal.value).startswith(
-            "this result cannot be the baseline: coulomb friction is not identifiable (the record "
-            "does not determine it); sliding friction is not identifiable (the record does not "
-            "determine it): record more strokes, "
+            f"this result cannot be the baseline: coulomb friction {why}; sliding friction {why}: "
+            "record more strokes, "
         )
         assert monitor.baseline == before
         assert monitor.diagnosis().level == Level.OK
@@ -358,13 +339,8 @@ class TestChangeOfSettings:
         cause = "valve or window parameters were changed"
         assert str(monitor.buffer.snapshot().cleared_because) == cause
         assert monitor.result is result
-
-    def test_the_new_range_holds(self, result):
-        monitor = self.filled(result)
-        monitor.change_settings(
-            replaced(valve=dataclasses.replace(BENCH_VALVE, pressure_maximum=2e5))
-        )
-        assert "0 to 200000 Pa" in str(monitor.buffer.add_pressure(START, 2.1e5))
+        if "valve" in changes:
+            assert "0 to 200000 Pa" in str(monitor.buffer.add_pressure(START, 2.1e5))
 
     @pytest.mark.parametrize(
         "changes",
@@ -382,15 +358,10 @@ class TestChangeOfSettings:
         assert monitor.buffer.snapshot().cleared_because is None
         assert monitor.settings == changed
 
-    def test_a_baseline_that_was_set_survives_other_changes(self, result):
-        monitor = self.filled(result)
-        monitor.baseline = monitor.result_as_baseline()
-        monitor.change_settings(replaced(limits=FrictionLimits(warn_ratio=1.2)))
-        assert monitor.baseline == Baseline.of(result)
-
-    def test_new_limits_judge_the_old_estimate(self, result):
+    def test_new_limits_judge_the_old_estimate_by_the_same_baseline(self, result):
         healthy = Baseline(coulomb_friction(result).value / 1.2)
         monitor = self.filled(result, healthy)
         assert monitor.diagnosis().level == Level.OK
         monitor.change_settings(dataclasses.replace(monitor.settings, limits=FrictionLimits(1.15)))
         assert monitor.diagnosis().level == Level.WARN
+        assert monitor.baseline == healthy

@@ -14,7 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from records import quick_record, stroked_record
+from records import quick_record, simulated, stroked_record
 
 from valve_friction_ros.health import (
     Baseline,
@@ -60,8 +60,12 @@ def numbers(record, valve=BENCH_VALVE):
 
 @pytest.fixture(scope="module")
 def healthy():
-    record = stroked_record()
-    return Baseline(150.0, numbers=valve_numbers(identify(record, BENCH_VALVE)))
+    return Baseline(150.0, numbers=valve_numbers(identify(stroked_record(), BENCH_VALVE)))
+
+
+def known_after(healthy, record):
+    """What is known of the healthy valve after a refused record."""
+    return KnownNumbers().followed_by(healthy.numbers, 0).followed_by(numbers(record), 1)
 
 
 @pytest.mark.parametrize("share", [0.09, 0.12, 0.16])
@@ -69,7 +73,7 @@ def test_lost_travel(healthy, share):
     record = stroked_record(share * TRAVEL)
     with pytest.raises(RefusalError, match="no friction model reproduces"):
         identify(record, BENCH_VALVE)
-    known = KnownNumbers().followed_by(healthy.numbers, 0).followed_by(numbers(record), 1)
+    known = known_after(healthy, record)
     (finding,) = known.findings(healthy, BENCH_VALVE)
     assert "travel is lost at the lower end" in finding.message
     assert known.numbers["lower_stop"].value == pytest.approx(share * TRAVEL, abs=5e-5)
@@ -78,19 +82,17 @@ def test_lost_travel(healthy, share):
 
 @pytest.mark.parametrize(("low", "high"), [(0.1, 0.75), (0.4, 0.6), (0.1, 1.15)])
 def test_a_stem_that_turned_before_a_stop_shows_none_there(healthy, low, high):
-    found = numbers(stroked_record(low=low, high=high))
+    record = stroked_record(low=low, high=high)
+    found = numbers(record)
     assert "lower_stop" not in found
     assert ("upper_stop" in found) == (high > 1)
-    known = KnownNumbers().followed_by(healthy.numbers, 0).followed_by(found, 1)
-    assert known.findings(healthy, BENCH_VALVE) == ()
+    assert known_after(healthy, record).findings(healthy, BENCH_VALVE) == ()
 
 
 def test_a_noise_that_has_grown(healthy):
     record = SensorNoise(1e-4, 50.0, 2).applied_to(stroked_record(0.16 * TRAVEL))
-    known = KnownNumbers().followed_by(healthy.numbers, 0).followed_by(numbers(record), 1)
-    messages = [one.message for one in known.findings(healthy, BENCH_VALVE)]
-    assert len(messages) == 2
-    assert "the noise of the stem position has grown" in messages[1]
+    _, noise = known_after(healthy, record).findings(healthy, BENCH_VALVE)
+    assert "the noise of the stem position has grown" in noise.message
 
 
 @pytest.mark.parametrize(
@@ -137,14 +139,12 @@ def test_a_sticky_stem_meets_no_stop():
     time = np.arange(6000) / 100
     levels = np.random.default_rng(5).uniform(0.15, 0.85, 16)
     pressure = 41_740.0 + 165_100.0 * np.interp(time, 4 * np.arange(16), levels)
-    position = simulate(BENCH_VALVE, sticky, pressure, 0.01).position
-    found = stem_reach(Recording(0.01, pressure, position), BENCH_VALVE, math.nan)
-    assert found.keys() == ENDS
+    record = simulated(pressure, 0.01, sticky)
+    assert stem_reach(record, BENCH_VALVE, math.nan).keys() == ENDS
 
 
 STICKY = replace(HIGH_FRICTION, static_friction=2 * HIGH_FRICTION.coulomb_friction)
 SLIP = STICKY.static_friction - STICKY.coulomb_friction
-STEM_TRAVEL = BENCH_VALVE.travel
 TIME = np.arange(3000) / 100
 
 
@@ -153,7 +153,7 @@ def strokes_between(low, high, seat=0.0, noise=0.0):
     wave = SineWave(period=10.0).sample(TIME)
     share = (wave - wave.min()) / np.ptp(wave)
     pressure = 1e3 * (low + (high - low) * share)
-    inner = replace(BENCH_VALVE, travel=STEM_TRAVEL - seat)
+    inner = replace(BENCH_VALVE, travel=TRAVEL - seat)
     moved = replace(STICKY, spring_preload=STICKY.spring_preload + STICKY.spring_constant * seat)
     position = simulate(inner, moved, pressure, 0.01).position + seat
     position = position + noise * np.random.default_rng(5).standard_normal(position.size)
@@ -164,9 +164,9 @@ def strokes_between(low, high, seat=0.0, noise=0.0):
 @pytest.mark.parametrize("noise", [0.0, 40e-6])
 def test_a_stem_that_turns_between_the_stops_meets_none(known, noise):
     found = stem_reach(strokes_between(70.0, 160.0, noise=noise), BENCH_VALVE, known)
-    assert found.keys() == {"lowest_position", "highest_position"}
+    assert found.keys() == ENDS
     low, high = found["lowest_position"], found["highest_position"]
-    assert 0.0 < low.value < high.value < STEM_TRAVEL
+    assert 0.0 < low.value < high.value < TRAVEL
 
 
 @pytest.mark.parametrize(
@@ -177,9 +177,9 @@ def test_a_stem_that_turns_between_the_stops_meets_none(known, noise):
 def test_stops_are_found_where_they_are(known, low, high, noise, seat):
     """Without a known slip force, only those against which the stem is pressed by far more."""
     found = stem_reach(strokes_between(low, high, seat, noise), BENCH_VALVE, known)
-    for name, place in (("lower_stop", seat), ("upper_stop", STEM_TRAVEL)):
+    for name, place in (("lower_stop", seat), ("upper_stop", TRAVEL)):
         assert abs(found[name].value - place) <= found[name].half_width
-        assert found[name].half_width < 0.01 * STEM_TRAVEL
+        assert found[name].half_width < 0.01 * TRAVEL
 
 
 def test_a_stem_that_waits_at_the_begin_may_have_come_from_either_side():
@@ -200,8 +200,7 @@ UNIT = replace(BENCH_VALVE, diaphragm_area=1.0, pressure_reference=0.0)
 def test_a_force_that_falls_and_grows_while_the_stem_rests_proves_no_stop(seed):
     """Noise takes the stem across the limit of its end; that is no arrival with a small force."""
     noise = 40e-6 * np.random.default_rng(seed).standard_normal(TIME.size)
-    found = stem_reach(Recording(0.01, FORCE, PLACE + noise), UNIT, 50.0)
-    assert found.keys() == {"lowest_position", "highest_position"}
+    assert stem_reach(Recording(0.01, FORCE, PLACE + noise), UNIT, 50.0).keys() == ENDS
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -213,9 +212,8 @@ def test_the_last_bit_of_a_converter_proves_none_either(seed):
     seen = np.interp(own, TIME, PLACE) + 1e-5 * wander
     seen = 50e-6 * np.round(seen / 50e-6 + 0.5)
     stamped = StampedRecord(StampedSignal(TIME, FORCE), StampedSignal(own, seen))
-    strokes_between = Recording(0.01, FORCE, np.interp(TIME, own, seen), stamped=stamped)
-    found = stem_reach(strokes_between, UNIT, 50.0)
-    assert found.keys() == {"lowest_position", "highest_position"}
+    record = Recording(0.01, FORCE, np.interp(TIME, own, seen), stamped=stamped)
+    assert stem_reach(record, UNIT, 50.0).keys() == ENDS
 
 
 def waves(position_noise, pressure_noise, rate=200.0, period=8.0, seed=3, colour=0.0, stroke=1.0):
@@ -242,15 +240,10 @@ def test_white_noise_is_found_with_its_interval(rate, seed):
         assert found[name].half_width < 0.1 * true
 
 
-def test_a_signal_that_moves_more_than_its_noise_from_sample_to_sample_has_none_to_show():
+def test_what_depends_on_rate_or_motion_is_no_noise():
+    """A signal that moves more from sample to sample; noise with a memory; a short record."""
     assert sensor_noises(waves(1e-5, 100.0, rate=5.0, period=2.0)) == {}
-
-
-def test_noise_with_a_memory_depends_on_the_rate_and_is_left_out():
     assert sensor_noises(waves(1e-5, 100.0, colour=0.95)) == {}
-
-
-def test_a_short_record_shows_none():
     short = waves(1e-5, 100.0)
     assert sensor_noises(Recording(0.005, short.pressure[:150], short.position[:150])) == {}
 
@@ -299,11 +292,6 @@ def given(counter, pressures, positions, second=0):
 
 def blocks(*values):
     return np.repeat(np.array(values, dtype=float), BLOCK)
-
-
-def test_half_of_the_change_of_force_is_the_least_friction():
-    """10 kPa on 0.05 m² are 500 N, which 250 N of friction just hold from end to end."""
-    assert Standstill(0, 0.01, 1e5, 1.1e5).least_friction(ACTUATOR) == pytest.approx(250.0)
 
 
 def test_the_range_is_that_of_the_means_of_blocks_after_which_the_stem_stood_still():
@@ -358,20 +346,21 @@ def test_a_clock_that_is_set_back_begins_anew():
 
 @pytest.mark.parametrize(("change", "is_found"), [(8.39e3, False), (8.41e3, True)])
 def test_found_from_twice_the_baseline_on(change, is_found):
-    """Twice 105 N, the upper end, needs 420 N or 8.4 kPa."""
+    """Twice 105 N, the upper end, just hold 420 N from end to end: 8.4 kPa on 0.05 m²."""
     still = Standstill(10**9, 0.01, 1e5, 1e5 + change)
     found = standstill_finding(still, ACTUATOR, HEALTHY, 2.0)
     assert (found is not None) is is_found
 
 
-@pytest.mark.parametrize("place", [0.0, 0.0005, 0.0175, 0.018, 0.0195, -0.001])
-def test_nothing_is_said_near_the_ends_of_the_way_of_the_baseline(place):
-    assert standstill_finding(Standstill(1, place, 0.0, 1e5), ACTUATOR, HEALTHY, 2.0) is None
+UNKNOWN_WAY = Baseline(coulomb_friction=100.0, half_width=5.0)
 
 
-def test_nothing_is_said_where_that_way_is_not_known():
-    without = Baseline(coulomb_friction=100.0, half_width=5.0)
-    assert standstill_finding(Standstill(1, 0.01, 0.0, 1e5), ACTUATOR, without, 2.0) is None
+@pytest.mark.parametrize(
+    ("place", "baseline"),
+    [*((place, HEALTHY) for place in (0.0, 5e-4, 0.0175, 0.0195, -1e-3)), (0.01, UNKNOWN_WAY)],
+)
+def test_nothing_is_said_outside_the_way_of_the_baseline_or_near_its_ends(place, baseline):
+    assert standstill_finding(Standstill(1, place, 0.0, 1e5), ACTUATOR, baseline, 2.0) is None
 
 
 def test_static_friction_of_the_baseline_counts():

@@ -24,7 +24,7 @@ from valve_friction_ros.health import (
     StatusSignal,
     ValveLimits,
     diagnose_numbers,
-    diagnose_parameters,
+    diagnose_valve,
     valve_changes,
     valve_numbers,
 )
@@ -64,23 +64,15 @@ MAINTENANCE, FUNCTION = StatusSignal.MAINTENANCE_REQUIRED, StatusSignal.CHECK_FU
 def found(baseline=BASELINE, valve=VALVE, limits=None, **changes):
     """Findings where the numbers of the healthy valve are changed to these; None: not known."""
     numbers = HEALTHY | {
-        name: one if isinstance(one, Measured) else Measured(*one)
-        for name, one in changes.items()
-        if one
+        name: Measured(*one) if isinstance(one, tuple) else one for name, one in changes.items()
     }
-    for name, one in changes.items():
-        if one is None:
-            del numbers[name]
-    return diagnose_numbers(numbers, baseline, valve, limits)
+    known = {name: one for name, one in numbers.items() if one is not None}
+    return diagnose_numbers(known, baseline, valve, limits)
 
 
 def only(findings):
     assert len(findings) == 1, findings
     return findings[0]
-
-
-def test_an_unchanged_valve_has_no_finding():
-    assert found() == ()
 
 
 def test_a_baseline_of_a_friction_alone_says_nothing():
@@ -230,13 +222,11 @@ class TestCausesThatLookTheSame:
         assert "packing with more friction upward" in message
 
     def test_stops_that_stay_exclude_the_position_sensor(self):
+        """And a shift beyond the friction excludes an uneven packing."""
         message = only(found(spring_preload=(620.0, 1.0), limits=LOW)).message
         assert "the bench set" in message
         assert "position sensor" not in message
-
-    def test_a_shift_beyond_the_friction_is_no_asymmetry(self):
-        message = only(found(spring_preload=(800.0, 1.0))).message
-        assert "packing" not in message
+        assert "packing" not in only(found(spring_preload=(800.0, 1.0))).message
 
     def test_stops_that_move_with_the_balance_convict_the_position_sensor(self):
         shift = -2e-3
@@ -279,17 +269,24 @@ class TestCausesThatLookTheSame:
 LOW = replace(LIMITS, preload_change=0.01)
 
 
-def test_travel_is_lost_where_the_baseline_met_no_stop_and_went_further():
+@pytest.mark.parametrize(
+    ("end", "stop", "far", "way"),
+    [
+        ("lower", "lower_stop", "lowest_position", 1.0),
+        ("upper", "upper_stop", "highest_position", -1.0),
+    ],
+)
+def test_a_stop_met_once_is_compared_with_the_reach_of_the_other(end, stop, far, way):
+    """Travel is lost where the baseline went on; beyond its stop, the stop has moved outward."""
+    healthy = HEALTHY[stop].value
     reached = {name: one for name, one in HEALTHY.items() if "stop" not in name}
     baseline = replace(BASELINE, numbers=reached)
-    assert "travel is lost" in only(found(baseline, lower_stop=(2e-3, 1e-5))).message
-    assert found(baseline, lower_stop=(-2e-3, 1e-5)) == ()
-
-
-def test_a_stem_beyond_the_healthy_stop_shows_that_it_has_moved():
-    beyond = {"lower_stop": None, "lowest_position": (-2e-3, 1e-5)}
-    assert "lower end has moved outward by -2.00 mm" in only(found(**beyond)).message
-    assert found(lower_stop=None, lowest_position=(2e-3, 1e-5)) == ()
+    inside, outside = ((healthy + 2e-3 * side, 1e-5) for side in (way, -way))
+    assert f"lost at the {end} end" in only(found(baseline, **{stop: inside})).message
+    assert found(baseline, **{stop: outside}) == ()
+    beyond = found(**{stop: None, far: outside})
+    assert f"{end} end has moved outward by {-2.0 * way:+.2f} mm" in only(beyond).message
+    assert found(**{stop: None, far: inside}) == ()
 
 
 def test_a_stop_that_stays_leaves_the_span_of_the_position_sensor():
@@ -330,12 +327,12 @@ class TestWholeIdentifications:
 
     def test_an_unchanged_valve_with_another_noise(self, healthy_result):
         again = identify(noisy_record(LOW_FRICTION, 2), BENCH_VALVE)
-        assert diagnose_parameters(again, Baseline.of(healthy_result)) == ()
+        assert diagnose_valve(again, Baseline.of(healthy_result)).findings == ()
 
     def test_a_spring_that_has_lost_a_third_of_its_stiffness(self, healthy_result):
         weak = replace(LOW_FRICTION, spring_constant=LOW_FRICTION.spring_constant * 2 / 3)
         result = identify(noisy_record(weak, 3), BENCH_VALVE)
-        finding = only(diagnose_parameters(result, Baseline.of(healthy_result)))
+        finding = only(diagnose_valve(result, Baseline.of(healthy_result)).findings)
         assert finding.level is ERROR
         assert finding.message.startswith("the spring constant has changed")
         numbers = valve_numbers(result)
@@ -353,7 +350,9 @@ class TestWholeIdentifications:
         true = noisy_record(LOW_FRICTION, 5)
         read = Recording(true.sample_period, true.drive + error[0], true.position + error[1])
         result = identify(read, BENCH_VALVE)
-        found = diagnose_parameters(result, Baseline.of(healthy_result), LOW)
+        found = diagnose_numbers(
+            valve_numbers(result), Baseline.of(healthy_result), BENCH_VALVE, LOW
+        )
         (balance,) = [one.message for one in found if "balance" in one.message]
         assert words in balance
 
@@ -366,9 +365,9 @@ def test_a_preload_near_zero_is_judged_by_its_newtons(healthy_result, zero):
     assert result.parameters["spring_preload"].verdict is not Verdict.NOT_IDENTIFIABLE
     shift = valve_changes(valve_numbers(result), valve_numbers(healthy_result))["spring_preload"]
     assert shift.holds(BENCH_VALVE.diaphragm_area * zero)
-    finding = only(diagnose_parameters(result, Baseline.of(healthy_result)))
+    finding = only(diagnose_valve(result, Baseline.of(healthy_result)).findings)
     assert f"the zero of the pressure sensor ({1e-3 * zero:.2g}" in finding.message
-    back = diagnose_parameters(healthy_result, Baseline.of(result))
+    back = diagnose_valve(healthy_result, Baseline.of(result)).findings
     assert "the force balance has shifted" in only(back).message
 
 
@@ -399,10 +398,13 @@ def test_a_slip_jump_is_known_to_half_of_itself_where_friction_is_not(
     assert numbers["slip_force"] == Measured(160.0, math.hypot(30.0, width))
 
 
+def numbers_with(result, **parameters):
+    return valve_numbers(replace(result, parameters={**result.parameters, **parameters}))
+
+
 def test_a_spring_that_is_hardly_known_leaves_no_other_number(healthy_result):
     spring = replace(healthy_result.parameters["spring_constant"], half_width=0.11 * 2.05e5)
-    parameters = {**healthy_result.parameters, "spring_constant": spring}
-    numbers = valve_numbers(replace(healthy_result, parameters=parameters))
+    numbers = numbers_with(healthy_result, spring_constant=spring)
     assert "spring_preload" not in numbers
     assert "stem_noise" in numbers
 
@@ -410,6 +412,5 @@ def test_a_spring_that_is_hardly_known_leaves_no_other_number(healthy_result):
 @pytest.mark.parametrize("verdict", Verdict)
 def test_a_viscous_friction_counts_where_it_is_told_apart_from_a_lag(healthy_result, verdict):
     viscous = Parameter("viscous_friction", 4.9e3, 100.0, 200.0, verdict)
-    parameters = {**healthy_result.parameters, "viscous_friction": viscous}
-    numbers = valve_numbers(replace(healthy_result, parameters=parameters))
+    numbers = numbers_with(healthy_result, viscous_friction=viscous)
     assert ("viscous_friction" in numbers) is (verdict is Verdict.IDENTIFIED)

@@ -27,33 +27,21 @@ from valve_friction_ros.streams import (
     Intake,
     Kind,
     RecordBuffer,
-    SampleFault,
     Samples,
-    Signal,
     nanoseconds,
     rows_arrived,
     uniform_recording,
     utc,
 )
 from valve_friction_ros.streams.samples import SampleBuffer
-from valve_friction_ros.wording import Code
 
 START = 1_700_000_000_000_000_000  # ns, where float seconds are 238 ns apart
 
 
-@pytest.mark.parametrize(
-    ("seconds", "expected"),
-    [
-        (0.0, 0),
-        (1e-3, 1_000_000),
-        (0.1 + 0.2, 300_000_000),
-        (1 / 3, 333_333_333),
-        (-0.5, -(10**9) // 2),
-    ],
-)
-def test_nanoseconds_are_the_nearest(seconds, expected):
-    assert nanoseconds(seconds) == expected
-    assert isinstance(nanoseconds(seconds), int)
+def test_nanoseconds_are_the_nearest():
+    found = [nanoseconds(seconds) for seconds in (0.0, 0.1 + 0.2, 1 / 3, -0.5)]
+    assert found == [0, 300_000_000, 333_333_333, -500_000_000]
+    assert isinstance(found[1], int)
 
 
 def test_the_window_holds_its_ends():
@@ -64,7 +52,7 @@ def test_the_window_holds_its_ends():
     np.testing.assert_array_equal(buffer.samples().stamps, [START, START + 500, START + 10**9])
 
 
-def test_samples_are_a_copy():
+def test_samples_are_a_copy_until_a_clear():
     buffer = SampleBuffer(1.0)
     buffer.append(START, 1.0)
     before = buffer.samples()
@@ -72,33 +60,11 @@ def test_samples_are_a_copy():
     before.values[0] = 9.0
     assert before.stamps.size == 1
     assert buffer.samples().values.tolist() == [1.0, 2.0]
-
-
-def test_clear():
-    buffer = SampleBuffer(1.0)
-    buffer.append(START, 1.0)
     buffer.clear()
     assert len(buffer) == 0
     assert buffer.last_stamp is None
     buffer.append(0, 2.0)  # earlier than what was there before
     assert buffer.samples().values.tolist() == [2.0]
-
-
-@given(
-    pauses=st.lists(st.integers(1, 400_000_000), min_size=1, max_size=200),
-    window=st.integers(1, 10**9),
-)
-def test_keeps_the_last_window_and_little_more(pauses, window):
-    """Nothing within the window is lost, and nothing older than 1.1 windows stays in memory."""
-    buffer = SampleBuffer(window / 1e9)
-    stamps = START + np.cumsum(pauses)
-    for stamp in stamps.tolist():
-        buffer.append(stamp, float(stamp - START))
-        assert len(buffer) <= np.count_nonzero((stamps >= stamp - 1.1 * window) & (stamps <= stamp))
-    expected = stamps[stamps >= stamps[-1] - window]
-    found = buffer.samples()
-    np.testing.assert_array_equal(found.stamps, expected)
-    np.testing.assert_array_equal(found.values, (expected - START).astype(float))
 
 
 @given(
@@ -144,8 +110,6 @@ def test_a_stamp_is_nanoseconds_since_1970_in_utc():
 
 
 ARRIVALS_START = 1_700_000_000  # s
-FAULTS = {Code[f"SAMPLE_{fault.name}"]: fault for fault in SampleFault}
-FAULTS[Code.BUFFER_CLEARED] = SampleFault.BACK
 
 
 def arrivals(samples):
@@ -154,20 +118,10 @@ def arrivals(samples):
 
 
 def add_one_by_one(buffer, samples):
-    """The readable form of `RecordBuffer.add_arrivals`."""
-    rejected, cleared = Counter(), []
-    for kind, stamp, value in samples:
-        if kind == Kind.PRESSURE:
-            problem = buffer.add_pressure(stamp, value)
-        else:
-            problem = buffer.add_position(stamp, None if kind == Kind.NO_POSITION else value)
-        if problem is not None:
-            signal = Signal.PRESSURE if kind == Kind.PRESSURE else Signal.POSITION
-            fault = FAULTS[problem.code]
-            rejected[signal, fault] += 1
-            if fault is SampleFault.BACK:
-                cleared.append(problem)
-    return Intake(rejected, cleared[0] if cleared else None)
+    """Each as a block of its own."""
+    intakes = [buffer.add_arrivals(arrivals([one])) for one in samples]
+    rejected = sum((Counter(one.rejected) for one in intakes), Counter())
+    return Intake(rejected, next((one.cleared for one in intakes if one.cleared), None))
 
 
 @st.composite
@@ -323,17 +277,6 @@ class TestUniformSignals:
         np.testing.assert_allclose(record.pressure, pressure(time), rtol=16 * EPS)
         np.testing.assert_allclose(record.position, position(time), rtol=16 * EPS)
 
-    def test_a_curve_is_met_at_the_stamps_and_missed_by_its_sagitta_between(self):
-        """c·t² between two samples h apart lies c·h²/4 below the chord's middle."""
-        curvature, step = 3e4, 0.02
-        record = uniform_recording(
-            signal(every(20, 50), lambda t: curvature * t**2), signal(every(10, 99), position)
-        )
-        excess = record.pressure - curvature * record.time**2
-        largest = 16 * EPS * record.pressure.max()
-        np.testing.assert_allclose(excess[::2], 0.0, atol=largest)
-        np.testing.assert_allclose(excess[1::2], curvature * step**2 / 4, atol=largest)
-
 
 class TestOverlap:
     def test_only_the_time_that_both_cover(self):
@@ -374,29 +317,12 @@ class TestUnevenStamps:
             signal(stamps, lambda t: offset - slope * t),
         )
         largest = abs(offset) + abs(slope) * (stamps[-1] - START + 3 * MILLISECOND) / 1e9
-        tolerance = 16 * EPS * largest
-        np.testing.assert_allclose(
-            record.pressure, offset + slope * record.time, rtol=0, atol=tolerance
-        )
-        np.testing.assert_allclose(
-            record.position, offset - slope * record.time, rtol=0, atol=tolerance
-        )
+        tolerance = 16 * EPS * largest + 1e-300  # subnormal numbers are no test of rounding
+        rise = slope * record.time
+        np.testing.assert_allclose(record.pressure, offset + rise, rtol=0, atol=tolerance)
+        np.testing.assert_allclose(record.position, offset - rise, rtol=0, atol=tolerance)
         assert record.sample_period == int(np.median(pauses)) / 1e9
         assert len(record) == (stamps[-1] - START) // int(np.median(pauses)) + 1
-
-    @given(
-        st.lists(st.integers(500_000, 1_500_000), min_size=20, max_size=60), st.integers(1, 10**18)
-    )
-    def test_the_clock_may_start_anywhere(self, pauses, shift):
-        stamps = np.cumsum(pauses)
-        rough = np.sin(np.arange(stamps.size) ** 2)
-        at_once = uniform_recording(Samples(stamps, rough), Samples(stamps + 7, rough))
-        later = uniform_recording(
-            Samples(stamps + shift, rough), Samples(stamps + 7 + shift, rough)
-        )
-        np.testing.assert_array_equal(at_once.pressure, later.pressure)
-        np.testing.assert_array_equal(at_once.position, later.position)
-        assert later.start_time == float(stamps[0] + 7 + shift) / 1e9
 
 
 class TestGaps:
@@ -420,6 +346,8 @@ class TestGaps:
         signals = (cut, whole) if gappy == "actuator_pressure" else (whole, cut)
         found = gaps_of(*signals)
         assert uniform_recording(*signals).gap == str(found)
+        of_the_caller = uniform_recording(*signals, refusal_of=lambda gap: gap.what).gap
+        assert of_the_caller == f"gap of 0.01 s in {gappy}, 0.007 s after its first sample"
         assert str(found) == (
             f"gap of 0.01 s in {gappy}, 0.007 s after its first sample: use a record without a "
             "gap, or clear the buffer and record again"
@@ -440,32 +368,19 @@ class TestGaps:
     def test_half_of_the_time_at_most(self, gappy, pauses):
         """90 ms of samples stand beside each pause of 90 ms; one of 91 ms is refused."""
         whole = signal(every(1, 181 * pauses + 1), pressure)
-        for length, enough in ((90, True), (91, False)):
+        pairs = []
+        for length in (90, 91):
             steps = [0] + [1] * 80 * pauses + ([length] + [1] * 10) * pauses
             cut = signal(START + MILLISECOND * np.cumsum(steps), position)
-            signals = (cut, whole) if gappy == "actuator_pressure" else (whole, cut)
-            if enough:
-                assert uniform_recording(*signals).gap.startswith(f"gap of 0.09 s in {gappy}")
-            else:
-                with pytest.raises(
-                    RefusalError, match=rf"^gap of 0\.091 s in {gappy}.*record again$"
-                ):
-                    uniform_recording(*signals)
+            pairs.append((cut, whole) if gappy == "actuator_pressure" else (whole, cut))
+        assert uniform_recording(*pairs[0]).gap.startswith(f"gap of 0.09 s in {gappy}")
+        with pytest.raises(RefusalError, match=rf"^gap of 0\.091 s in {gappy}.*record again$"):
+            uniform_recording(*pairs[1])
 
     def test_a_year_is_refused_before_its_grid_is_made(self):
         stamps = np.concatenate((every(1, 500), every(1, 500, 365 * 24 * 3_600_000)))
         with pytest.raises(RefusalError, match=r"^gap of 3\.15e\+07 s in actuator_pressure"):
             uniform_recording(signal(stamps, pressure), signal(stamps, position))
-
-    def test_words_of_the_caller(self):
-        record = uniform_recording(
-            signal(self.with_pause(11), pressure),
-            signal(every(1, 38), position),
-            refusal_of=lambda gap: f"{gap.what}: choose a stretch",
-        )
-        assert record.gap == (
-            "gap of 0.011 s in actuator_pressure, 0.007 s after its first sample: choose a stretch"
-        )
 
     def test_of_the_longest(self):
         stamps = np.concatenate((every(1, 8), every(1, 8, 20), every(1, 8, 60), every(1, 8, 80)))

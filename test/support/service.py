@@ -89,6 +89,11 @@ def parts(whole, cuts):
     return [Arrivals(*(column[begin:end] for column in whole)) for begin, end in pairwise(ends)]
 
 
+def changing_at(hour, before=300.0, after=450.0):
+    """A friction, N, that changes at an hour."""
+    return lambda now: after if now >= hour else before
+
+
 def made_moves(hours, friction, seed=0, period=12.0, noise=4.0, offset=None, viscous=0.0, **ranges):
     """Moves without their samples: `friction` and `offset` (N) at an hour; viscous in N·s/m."""
     random = np.random.default_rng(seed)

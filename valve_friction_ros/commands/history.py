@@ -304,7 +304,7 @@ def _told(entry: HistoryEntry) -> str:
     if found.statement.code is Code.HELD_IN_TEST:
         return headline(found.statement)
     if found.statement.code is Code.QUOTED and found.state is not FrictionState.UNKNOWN:
-        return entry.refusal or member_words(found.state, "state")  # from a former version
+        return entry.refusal or member_words(found.state.name, "state")  # from a former version
     return entry.refusal or headline(found.statement)
 
 

@@ -29,7 +29,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
 
-from valve_friction_ros.loopback import is_loopback
+from valve_friction_ros.outside_text import is_loopback
 
 
 def require_private(file: Path) -> None:

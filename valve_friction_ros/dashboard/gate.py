@@ -30,8 +30,7 @@ from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
 from valve_friction_ros.dashboard.accounts import Access, Account, Role
 from valve_friction_ros.dashboard.log_in import LogIn, Sessions, limited, network_of
-from valve_friction_ros.outside_text import printable
-from valve_friction_ros.page_template import page_environment
+from valve_friction_ros.outside_text import page_environment, printable
 
 _BASE = {
     "X-Content-Type-Options": "nosniff",

@@ -33,12 +33,7 @@ _LEAST_MOVES = 4
 def blocks_of(moves: Moves, most: int | None = None) -> NDArray[np.intp]:
     """Return the block of each move; a block has at least ten minutes and moves both ways.
 
-    Parameters
-    ----------
-    moves : Moves
-        The moves, oldest first.
-    most : int, optional
-        Approximate upper limit of the number of blocks; blocks get longer to respect it.
+    Blocks get longer where there would be more than about `most` of them.
     """
     if not len(moves):
         return np.array([], dtype=np.intp)
@@ -233,23 +228,8 @@ def scales_of(moves: Moves) -> Scales:
     return Scales(max(abs(float(found[0])), least), place, speed)
 
 
-class Levels(NamedTuple):
-    """Levels of the preload between steps of the process force.
-
-    Attributes
-    ----------
-    number : ndarray of int, shape (n,)
-        Level of each move, counted from 0.
-    largest : float
-        Largest step, N.
-    """
-
-    number: NDArray[np.intp]
-    largest: float
-
-
-def levels_of(moves: Moves) -> Levels:
-    """Find the steps of the process force.
+def levels_of(moves: Moves) -> tuple[NDArray[np.intp], float]:
+    """Find the steps of the process force: the level of each move, from 0, and the largest step, N.
 
     A pressure on the plug shifts the forces of upward and downward moves alike; friction shifts
     them apart. The mean of the medians of both directions therefore steps with the process force
@@ -258,7 +238,7 @@ def levels_of(moves: Moves) -> Levels:
     count, way = len(moves), moves.direction
     number = np.zeros(count, dtype=np.intp)
     if count < 4 * _LEAST_OF_A_SIDE:
-        return Levels(number, 0.0)
+        return number, 0.0
     left, friction = _without_spring(moves)
     error = float(np.median(np.abs(np.diff(left)))) / (MEDIAN_MAGNITUDE * math.sqrt(2.0))
     sides = np.array([_medians(np.where(way == sign, left, np.nan)) for sign in (1.0, -1.0)])
@@ -280,7 +260,7 @@ def levels_of(moves: Moves) -> Levels:
         number[near.start + int(np.argmin(np.concatenate(([0.0], np.cumsum(gain))))) :] += 1
         largest = max(largest, abs(float(steps[place])))
         over[near] = 0.0
-    return Levels(number, largest)
+    return number, largest
 
 
 def _without_spring(moves: Moves) -> tuple[NDArray[np.float64], float]:
@@ -322,8 +302,8 @@ def design_of(moves: Moves, frictions: NDArray[np.intp], scales: Scales) -> Desi
     """Return the rows of moves, with one friction per number in `frictions`."""
     passed = moves.time - moves.time[0]
     epoch = max(_EPOCH, float(passed[-1]) / (_MOST_EPOCHS - 1))
-    levels = levels_of(moves)
-    numbers = (passed / epoch).astype(np.intp) + (_MOST_EPOCHS + 1) * levels.number
+    levels, largest_step = levels_of(moves)
+    numbers = (passed / epoch).astype(np.intp) + (_MOST_EPOCHS + 1) * levels
     kinds, epochs = np.unique(numbers, return_inverse=True)
     way, away = moves.direction, moves.place - scales.place
     dense = np.zeros((len(moves), PRELOAD + 1))
@@ -341,7 +321,7 @@ def design_of(moves: Moves, frictions: NDArray[np.intp], scales: Scales) -> Desi
         moves.force_rate,
         kinds.size if kinds.size > 1 else 0,
         int(frictions.max()) + 1,
-        levels.largest,
+        largest_step,
     )
 
 
@@ -474,26 +454,11 @@ class Balance:
 def balance_of(
     moves: Moves, timing: float, travel: float, spring_constant: float | None = None
 ) -> Balance | None:
-    """Estimate the unknowns from moves.
+    """Estimate the unknowns from moves, oldest first; None with too few.
 
-    Parameters
-    ----------
-    moves : Moves
-        The moves, oldest first.
-    timing : float
-        Standard deviation of the lag between the signals, s.
-    travel : float
-        Travel of the stem, m.
-    spring_constant : float, optional
-        Known value, N/m.
+    `timing` is the standard deviation of the lag between the signals, s, and `spring_constant` a
+    known value, N/m.
 
-    Returns
-    -------
-    Balance or None
-        None with too few moves.
-
-    Notes
-    -----
     Moves are weighted by distance, so the sliding friction is the mean over the distance. Outliers
     have Huber's weights. All unknowns except friction, spring and first preload have priors, which
     enter the covariance too. The scatter comes from leaving out one block of time after another

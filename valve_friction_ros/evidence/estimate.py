@@ -15,7 +15,7 @@ declared.
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -23,7 +23,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from valve_friction_ros.evidence.balance import (
-    ALONG,
     FEWEST_BLOCKS,
     FEWEST_MOVES,
     MOST_BLOCKS,
@@ -310,12 +309,6 @@ class Evidence:
     parameters: Mapping[str, Parameter]
     sliding_speed: float = math.nan
     changes: tuple[FrictionChange, ...] = ()
-    values: Mapping[str, float] = field(init=False, repr=False, compare=False)
-
-    def __post_init__(self) -> None:
-        """Collect the values of the parameters by name."""
-        values = {name: one.value for name, one in self.parameters.items()}
-        object.__setattr__(self, "values", values)
 
     @property
     def change(self) -> FrictionChange | None:
@@ -415,28 +408,26 @@ def _too_few(moves: Moves, has_changed: bool) -> str:
 
 def _parameters(balance: Balance, spring: float | None) -> dict[str, Parameter]:
     values = balance.values
-    size = values.size
 
-    def along(**slopes: float) -> NDArray[np.float64]:
-        slope = np.zeros(size)
-        for name, value in slopes.items():
-            slope[_PLACES[name]] = value
+    def along(slopes: Mapping[int, float]) -> NDArray[np.float64]:
+        slope = np.zeros(values.size)
+        slope[list(slopes)] = list(slopes.values())
         return slope
 
     sliding, static, k = (float(values[one]) for one in (SLIDING, STATIC, SPRING))
     numbers = {
-        "sliding_friction": (sliding, along(sliding=1.0)),
-        "viscous_friction": (float(values[SPEED]), along(speed=1.0)),
-        "static_friction": (static, along(static=1.0)),
-        "spring_constant": (k, along(spring=1.0)),
+        "sliding_friction": (sliding, along({SLIDING: 1.0})),
+        "viscous_friction": (float(values[SPEED]), along({SPEED: 1.0})),
+        "static_friction": (static, along({STATIC: 1.0})),
+        "spring_constant": (k, along({SPRING: 1.0})),
         "spring_preload": (
             float(values[PRELOAD]) - k * balance.place,
-            along(preload=1.0, spring=-balance.place),
+            along({PRELOAD: 1.0, SPRING: -balance.place}),
         ),
     }
     if k > 0:
         band = (sliding + static) / k
-        slope = along(sliding=1 / k, static=1 / k, spring=-band / k)
+        slope = along({SLIDING: 1 / k, STATIC: 1 / k, SPRING: -band / k})
         numbers["dead_band"] = (band, slope)
     found = {
         name: with_verdict(
@@ -456,7 +447,7 @@ def _parameters(balance: Balance, spring: float | None) -> dict[str, Parameter]:
         reason = f"{balance.onsets} breakaways from rest: {FEWEST_MOVES} are needed"
         for name in ("static_friction", "dead_band"):
             found[name] = not_identifiable(name, reason)
-    spread = balance.number(along(spring=1.0))[1] / k if k > 0 else math.inf
+    spread = balance.number(along({SPRING: 1.0}))[1] / k if k > 0 else math.inf
     if spring is None and spread > _MAX_SPRING_REL_HALF_WIDTH:
         found["dead_band"] = not_identifiable("dead_band", _vague_spring(k, spread))
     found["coulomb_friction"] = not_identifiable("coulomb_friction", _COULOMB)
@@ -484,13 +475,3 @@ def _doubt(balance: Balance, value: float, slope: NDArray[np.float64]) -> str:
         f"between the signals: set timing_uncertainty below {balance.timing:g} s if their clocks "
         "and lags are known"
     )
-
-
-_PLACES = {
-    "sliding": SLIDING,
-    "static": STATIC,
-    "spring": SPRING,
-    "speed": SPEED,
-    "along": ALONG,
-    "preload": PRELOAD,
-}

@@ -223,21 +223,6 @@ _LAG = 0.05
 """Time shift, s, of the pressure that gives the rate of the force over the distance."""
 
 
-class Cut(NamedTuple):
-    """Moves cut from samples.
-
-    Attributes
-    ----------
-    moves : tuple of Move
-        Moves that have ended, oldest first.
-    settled : int
-        Stamp, ns, before which samples are no longer needed.
-    """
-
-    moves: tuple[Move, ...]
-    settled: int
-
-
 class _Signals(NamedTuple):
     """Position (m) and force (N), each at its own times, s after the first position."""
 
@@ -259,7 +244,7 @@ class _Signals(NamedTuple):
         return force
 
 
-def rest_band(position: NDArray[np.float64], travel: float) -> float:
+def _rest_band(position: NDArray[np.float64], travel: float) -> float:
     """Return the displacement, m, that noise or a converter alone may cause."""
     step = quantisation_step(position)
     noise = math.hypot(position_noise(position), step / math.sqrt(12.0))
@@ -267,28 +252,19 @@ def rest_band(position: NDArray[np.float64], travel: float) -> float:
     return max(_BAND_NOISE * noise, _BAND_STEPS * step, least)
 
 
-def moves_in(pressure: Samples, position: Samples, valve: Valve, band: float) -> Cut:
-    """Cut samples into moves.
+def _moves_in(
+    pressure: Samples, position: Samples, valve: Valve, band: float
+) -> tuple[tuple[Move, ...], int]:
+    """Cut samples into moves, with a band of rest, m (`_rest_band`).
 
-    Parameters
-    ----------
-    pressure, position : Samples
-        Both signals, Pa and m.
-    valve : Valve
-        Gives area, reference and stops.
-    band : float
-        Band of rest, m (`rest_band`).
-
-    Returns
-    -------
-    Cut
-        The moves that have certainly ended. Moves with a gap in either signal, and the parts of a
-        motion near a stop, are left out.
+    Returns the moves that have certainly ended, oldest first, and the stamp, ns, before which
+    samples are no longer needed. Moves with a gap in either signal, and the parts of a motion near
+    a stop, are left out.
     """
     newest = int(min(pressure.stamps[-1], position.stamps[-1]))
     both = _signals(pressure, position, valve, newest)
     if both.time.size < 4 or not band > 0:
-        return Cut((), int(position.stamps[0]))
+        return (), int(position.stamps[0])
     runs = _motions(both, band)
     end = both.time.size - 1
     settled = both.time[-1] - 2 * REST
@@ -303,7 +279,7 @@ def moves_in(pressure: Samples, position: Samples, valve: Valve, band: float) ->
             last, settled = end, both.time[end]
         done = both.time[last]
         found += _moves_of(both, first, last, valve, band)
-    return Cut(tuple(found), both.origin + round(settled * 1e9))
+    return tuple(found), both.origin + round(settled * 1e9)
 
 
 def _signals(pressure: Samples, position: Samples, valve: Valve, newest: int) -> _Signals:
@@ -583,19 +559,19 @@ class MoveStream:
         if self._count * period < _BAND_PERIOD:
             return
         self._count = 0
-        band = rest_band(self._seen, self._valve.travel)
+        band = _rest_band(self._seen, self._valve.travel)
         self._band = max(band, _BAND_FADING * self._band) if self._band > 0 else band
 
     def _moves(self) -> tuple[Move, ...]:
         pressure, position = (self._kept[kind] for kind in _SIGNALS)
         if min(pressure.stamps.size, position.stamps.size) < 2 or not self._band > 0:
             return ()
-        cut = moves_in(pressure, position, self._valve, self._band)
+        moves, settled = _moves_in(pressure, position, self._valve, self._band)
         for kind in _SIGNALS:
             kept = self._kept[kind]
-            first = max(int(np.searchsorted(kept.stamps, cut.settled)) - 1, 0)
+            first = max(int(np.searchsorted(kept.stamps, settled)) - 1, 0)
             self._kept[kind] = Samples(kept.stamps[first:], kept.values[first:])
-        return cut.moves
+        return moves
 
 
 def _means(values: NDArray[np.int64] | NDArray[np.float64], together: int) -> NDArray[np.float64]:

@@ -25,8 +25,7 @@ from urllib.parse import quote
 
 from valve_friction_ros import __version__
 from valve_friction_ros.fleet.rows import COLUMNS, HEIGHT, PICTURE, WIDTH, Cell, ranked, status_of
-from valve_friction_ros.outside_text import csv_text
-from valve_friction_ros.page_template import page_environment
+from valve_friction_ros.outside_text import csv_text, page_environment
 from valve_friction_ros.records.files import write_whole
 from valve_friction_ros.wording import in_zone, number_and_width, percentage
 

@@ -91,7 +91,6 @@ from valve_friction_ros.health.valve_diagnosis import (
     ValveDiagnosis as ValveDiagnosis,
     ValveLimits as ValveLimits,
     diagnose_numbers as diagnose_numbers,
-    diagnose_parameters as diagnose_parameters,
     diagnose_valve as diagnose_valve,
     drive_scale as drive_scale,
     explains as explains,

@@ -22,8 +22,13 @@ from types import MappingProxyType
 
 from valve_friction_ros.health.alarms import NO_CONDITION, AlarmKind, Condition
 from valve_friction_ros.health.comparison import Ratio
-from valve_friction_ros.health.diagnosis import Diagnosis, FrictionLimits, Side
-from valve_friction_ros.health.levels import Finding, Level, StatusSignal, by_severity
+from valve_friction_ros.health.diagnosis import (
+    Diagnosis,
+    FrictionLimits,
+    FrictionState,
+    Side,
+)
+from valve_friction_ros.health.levels import Finding, Level, by_severity
 from valve_friction_ros.health.measured import Measured
 from valve_friction_ros.wording import Code, quoted, said, sentence
 
@@ -55,28 +60,12 @@ def widening(elapsed: float) -> float:
 def held_level(
     held: Level, ratio: Ratio, side: Side, limits: FrictionLimits, wider: float = 1.0
 ) -> Level:
-    """Return the level of a side after a look at the friction.
+    """Return the level of a side after a look at the friction, `held` before it.
 
-    Parameters
-    ----------
-    held : Level
-        The level before the look.
-    ratio : Ratio
-        Friction over its baseline with its 95 % interval.
-    side : Side
-        The side of the baseline.
-    limits : FrictionLimits
-        The limits of the levels.
-    wider : float
-        Factor by which the interval is widened, in its logarithm (`widening`).
-
-    Returns
-    -------
-    Level
-        The level nearest to `held` between the sure level and the possible level. A level is
-        possible where part of the interval lies beyond its limit. At a `wider` of 1 the sure level
-        agrees with `friction_state`. A wider interval demands as much more of a warning as of an
-        error.
+    It is the level nearest to `held` between the sure level and the possible level. A level is
+    possible where part of the interval of the ratio lies beyond its limit. The interval is widened
+    by a factor in its logarithm (`widening`): at a `wider` of 1 the sure level agrees with
+    `friction_state`, and beyond it a warning demands as much more as an error.
     """
     if not (ratio.value > 0 and ratio.low > 0) or math.isinf(wider):
         return held
@@ -97,13 +86,6 @@ def held_level(
 
 ALARM_OF_SIDE = {Side.HIGH: AlarmKind.FRICTION_HIGH, Side.LOW: AlarmKind.FRICTION_LOW}
 """The alarm on each side of the baseline."""
-
-_BY_SIDE = {
-    (Side.HIGH, Level.WARN): StatusSignal.MAINTENANCE_REQUIRED,
-    (Side.HIGH, Level.ERROR): StatusSignal.FAILURE,
-    (Side.LOW, Level.WARN): StatusSignal.MAINTENANCE_REQUIRED,
-    (Side.LOW, Level.ERROR): StatusSignal.OUT_OF_SPECIFICATION,
-}
 
 
 @dataclass(frozen=True)
@@ -170,7 +152,8 @@ class FrictionHold:
                 if own.state.side is not side:
                     active = quoted(before.message)
                     statement = said(Code.STANDS_UNCERTAIN, alarm=active, latest=statement)
-                shown[side] = Condition(level, _BY_SIDE[side, level], sentence(statement))
+                signal = FrictionState.moved(side, level).status_signal
+                shown[side] = Condition(level, signal, sentence(statement))
         return replace(self, conditions=shown, until=max(time, self.until or time))
 
 

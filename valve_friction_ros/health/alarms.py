@@ -91,19 +91,8 @@ class AlarmAction(Enum):
     @property
     def is_of_person(self) -> bool:
         """Whether a named person does it."""
-        return self in _OF_PERSONS
-
-
-_OF_PERSONS = frozenset(
-    {
-        AlarmAction.ACKNOWLEDGE,
-        AlarmAction.SHELVE,
-        AlarmAction.UNSHELVE,
-        AlarmAction.TAKE_OUT,
-        AlarmAction.PUT_BACK,
-        AlarmAction.COMMENT,
-    }
-)
+        by_valve = (AlarmAction.RAISE, AlarmAction.WORSEN, AlarmAction.EASE, AlarmAction.CLEAR)
+        return self not in (*by_valve, AlarmAction.EXPIRE)
 
 
 def _table() -> Mapping[tuple[AlarmState, AlarmAction], AlarmState | None]:
@@ -322,10 +311,16 @@ class AlarmRequest:
 _LONGEST = {AlarmAction.SHELVE: LONGEST_SHELVING, AlarmAction.TAKE_OUT: LONGEST_ABSENCE}
 
 
-def _stepped(alarm: Alarm, action: AlarmAction, time: int, condition: Condition) -> AlarmEvent:
+def _following(alarm: Alarm, action: AlarmAction, condition: Condition) -> AlarmState:
+    """Return the state after an action, where the condition decides if the table does not."""
     state = TRANSITIONS[alarm.state, action]
     if state is None:
-        state = AlarmState.UNACKNOWLEDGED if condition.level else AlarmState.NORMAL
+        return AlarmState.UNACKNOWLEDGED if condition.level else AlarmState.NORMAL
+    return state
+
+
+def _stepped(alarm: Alarm, action: AlarmAction, time: int, condition: Condition) -> AlarmEvent:
+    state = _following(alarm, action, condition)
     is_change = condition.level != alarm.condition.level
     after = Alarm(
         alarm.kind,
@@ -339,17 +334,7 @@ def _stepped(alarm: Alarm, action: AlarmAction, time: int, condition: Condition)
 
 
 def followed_by(alarm: Alarm, condition: Condition, time: int) -> tuple[AlarmEvent, ...]:
-    """Return the events of the clock and the valve on an alarm: none, one or two.
-
-    Parameters
-    ----------
-    alarm : Alarm
-        The alarm until now.
-    condition : Condition
-        The present condition.
-    time : int
-        Now, ns since 1970 (UTC).
-    """
+    """Return the events of the clock and the valve on an alarm at a time, ns: none, one or two."""
     events = []
     if alarm.until is not None and time >= alarm.until:
         events.append(_stepped(alarm, AlarmAction.EXPIRE, time, alarm.condition))
@@ -374,17 +359,11 @@ def requested(alarm: Alarm, request: AlarmRequest, time: int) -> AlarmEvent:
     """
     action = request.action
     if (alarm.state, action) not in TRANSITIONS:
-        verb = action.value
-        possible = ", ".join(
-            one.value
-            for one in AlarmAction
-            if one.is_of_person and (alarm.state, one) in TRANSITIONS
-        )
-        raise AlarmError(f"{alarm} and cannot be {verb} now: it can be {possible}")
+        allowed = [do for do in AlarmAction if do.is_of_person and (alarm.state, do) in TRANSITIONS]
+        possible = ", ".join(do.value for do in allowed)
+        raise AlarmError(f"{alarm} and cannot be {action.value} now: it can be {possible}")
     time = max(time, alarm.raised or time)
-    state = TRANSITIONS[alarm.state, action]
-    if state is None:
-        state = AlarmState.UNACKNOWLEDGED if alarm.is_active else AlarmState.NORMAL
+    state = _following(alarm, action, alarm.condition)
     until = alarm.until if state.is_suppressed else None
     if action in _LONGEST:
         until = time + round(request.duration * 1e9)

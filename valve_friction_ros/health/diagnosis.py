@@ -13,7 +13,7 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum, auto
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeAlias
 
 from valve_friction_ros.health.baseline import Baseline
 from valve_friction_ros.health.comparison import Ratio, carried, compared
@@ -96,6 +96,13 @@ class FrictionLimits:
         return max(1 / self.warn_ratio, math.sqrt(self.low_ratio))
 
 
+class Side(Enum):
+    """Side of the baseline on which the friction lies."""
+
+    HIGH = "high"
+    LOW = "low"
+
+
 class FrictionState(Enum):
     """State of the friction of a record against its baseline."""
 
@@ -112,10 +119,15 @@ class FrictionState(Enum):
     FALLEN = auto()
     COLLAPSED = auto()
 
+    @classmethod
+    def moved(cls, side: Side, level: Level) -> "FrictionState":
+        """Return the state of a friction that has moved to a side, by its level, WARN or ERROR."""
+        return next(one for one in cls if one.side is side and one.level is level)
+
     @property
-    def side(self) -> "Side | None":
+    def side(self) -> Side | None:
         """The side to which the friction has surely moved; None if that is not sure."""
-        return _SIDES.get(self)
+        return _MEANINGS[self][2]
 
     @property
     def is_uncertain(self) -> bool:
@@ -125,32 +137,23 @@ class FrictionState(Enum):
     @property
     def level(self) -> Level:
         """Severity of the state."""
-        return _SEVERITY[self][0]
+        return _MEANINGS[self][0]
+
+    @property
+    def status_signal(self) -> StatusSignal:
+        """The severity as a status signal of NE 107."""
+        return _MEANINGS[self][1]
 
 
-class Side(Enum):
-    """Side of the baseline on which the friction lies."""
-
-    HIGH = "high"
-    LOW = "low"
-
-
-_SIDES = {
-    FrictionState.GROWN: Side.HIGH,
-    FrictionState.EXCESS: Side.HIGH,
-    FrictionState.FALLEN: Side.LOW,
-    FrictionState.COLLAPSED: Side.LOW,
-}
-
-_SEVERITY = {
-    FrictionState.UNKNOWN: (Level.OK, StatusSignal.GOOD),
-    FrictionState.IMPOSSIBLE: (Level.WARN, StatusSignal.CHECK_FUNCTION),
-    FrictionState.NORMAL: (Level.OK, StatusSignal.GOOD),
-    FrictionState.UNCLEAR: (Level.OK, StatusSignal.GOOD),
-    FrictionState.GROWN: (Level.WARN, StatusSignal.MAINTENANCE_REQUIRED),
-    FrictionState.EXCESS: (Level.ERROR, StatusSignal.FAILURE),
-    FrictionState.FALLEN: (Level.WARN, StatusSignal.MAINTENANCE_REQUIRED),
-    FrictionState.COLLAPSED: (Level.ERROR, StatusSignal.OUT_OF_SPECIFICATION),
+_MEANINGS: dict[FrictionState, tuple[Level, StatusSignal, Side | None]] = {
+    FrictionState.UNKNOWN: (Level.OK, StatusSignal.GOOD, None),
+    FrictionState.IMPOSSIBLE: (Level.WARN, StatusSignal.CHECK_FUNCTION, None),
+    FrictionState.NORMAL: (Level.OK, StatusSignal.GOOD, None),
+    FrictionState.UNCLEAR: (Level.OK, StatusSignal.GOOD, None),
+    FrictionState.GROWN: (Level.WARN, StatusSignal.MAINTENANCE_REQUIRED, Side.HIGH),
+    FrictionState.EXCESS: (Level.ERROR, StatusSignal.FAILURE, Side.HIGH),
+    FrictionState.FALLEN: (Level.WARN, StatusSignal.MAINTENANCE_REQUIRED, Side.LOW),
+    FrictionState.COLLAPSED: (Level.ERROR, StatusSignal.OUT_OF_SPECIFICATION, Side.LOW),
 }
 
 
@@ -218,7 +221,7 @@ class Diagnosis:
         cls, state: FrictionState, statement: Statement, ratio: Ratio | None = None
     ) -> "Diagnosis":
         """Return the diagnosis of a state, with its severity."""
-        return cls(*_SEVERITY[state], statement, ratio, state)
+        return cls(state.level, state.status_signal, statement, ratio, state)
 
     @property
     def message(self) -> str:
@@ -289,8 +292,8 @@ class Diagnosis:
         return f"{'unknown' if is_unknown else self.level.name}: {self.message}"
 
 
-class Frictions(Protocol):
-    """The numbers that a diagnosis compares, from a `Result` or stored."""
+class EarlierEstimate(Protocol):
+    """A stored estimate with its diagnosis."""
 
     @property
     def parameters(self) -> Mapping[str, Parameter]:
@@ -303,10 +306,6 @@ class Frictions(Protocol):
     @property
     def sliding_speed(self) -> float:
         """Speed of the sliding friction, m/s."""
-
-
-class EarlierEstimate(Frictions, Protocol):
-    """A stored estimate with its diagnosis."""
 
     @property
     def time(self) -> int:
@@ -332,7 +331,11 @@ class EarlierEstimate(Frictions, Protocol):
         """Return plain values with the keys of `Result.to_dict`."""
 
 
-def dead_band(result: Frictions, valve: Valve) -> float:
+Estimate: TypeAlias = Result | EarlierEstimate
+"""The numbers that a diagnosis compares, identified now or stored."""
+
+
+def dead_band(result: Estimate, valve: Valve) -> float:
     """Return the dead band of the stem as a share of the travel.
 
     After a move the sliding friction F_c still holds the spring off balance. To move back, the
@@ -351,7 +354,7 @@ def dead_band(result: Frictions, valve: Valve) -> float:
     return valve.share_of_travel((coulomb_friction + static_friction) / spring_constant)
 
 
-def dead_band_half_width(result: Frictions, valve: Valve) -> float:
+def dead_band_half_width(result: Estimate, valve: Valve) -> float:
     """Return half the width of the 95 % interval of the dead band, as a share of the travel.
 
     The errors of F_c and F_s are taken as fully correlated, the worst case. The error of k is
@@ -368,7 +371,7 @@ def dead_band_half_width(result: Frictions, valve: Valve) -> float:
     return abs(band) * math.hypot(friction, spring.half_width / spring.value)
 
 
-def survey_of(result: Frictions, valve: Valve, limits: SurveyLimits | None = None) -> Survey:
+def survey_of(result: Estimate, valve: Valve, limits: SurveyLimits | None = None) -> Survey:
     """Return the grade of a valve in a first survey, by its dead band.
 
     Without a spring constant, twice the friction over the force of the pressure sensor's range
@@ -395,7 +398,7 @@ def leading_ratio(diagnosis: Diagnosis, findings: Iterable[Finding], level: Leve
     return [*leading, *(f.friction_ratio for f in known), math.nan][0]
 
 
-def _consequence(result: Frictions, valve: Valve) -> Statement:
+def _consequence(result: Estimate, valve: Valve) -> Statement:
     share = dead_band(result, valve)
     if math.isnan(share):
         friction = next(one for one in _frictions(result) if not math.isnan(one.value))
@@ -403,7 +406,7 @@ def _consequence(result: Frictions, valve: Valve) -> Statement:
     return said(Code.DEAD_BAND, share=share)
 
 
-def _frictions(result: Frictions) -> list[Parameter]:
+def _frictions(result: Estimate) -> list[Parameter]:
     """Return F_c and, where the result has one, the sliding friction."""
     return [result.parameters[n] for n in ("coulomb_friction", SLIDING) if n in result.parameters]
 
@@ -475,7 +478,7 @@ def diagnose_again(
 
 
 def _by_size(
-    result: Frictions,
+    result: Estimate,
     valve: Valve,
     baseline: Baseline | None,
     limits: FrictionLimits,
@@ -506,7 +509,7 @@ def _not_identifiable(friction: Parameter) -> Statement:
     return said(Code.NOT_IDENTIFIABLE, of=friction.name, reason=friction.reason)
 
 
-def _why_not_compared(one: Parameter, result: Frictions, baseline: Baseline) -> Statement:
+def _why_not_compared(one: Parameter, result: Estimate, baseline: Baseline) -> Statement:
     if math.isnan(one.value):
         return _not_identifiable(one)
     if one.name == SLIDING and baseline.sliding is not None:
@@ -516,7 +519,7 @@ def _why_not_compared(one: Parameter, result: Frictions, baseline: Baseline) -> 
 
 
 def _vanished(
-    result: Frictions,
+    result: Estimate,
     baseline: Baseline,
     limits: FrictionLimits,
     numbers: Mapping[str, Measured],

@@ -18,9 +18,9 @@ from valve_friction_ros.health.baseline import Baseline, BaselineLack, Lack
 from valve_friction_ros.health.diagnosis import (
     Diagnosis,
     EarlierEstimate,
+    Estimate,
     FrictionLimits,
     FrictionState,
-    Side,
     StandingAlarm,
     diagnose,
     diagnose_again,
@@ -56,9 +56,6 @@ from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.streams.record_buffer import RecordBuffer, Snapshot
 from valve_friction_ros.wording import Code, Statement, said
 
-_LESSER = {Side.HIGH: FrictionState.GROWN, Side.LOW: FrictionState.FALLEN}
-"""State of an alarm after a record has surely cleared its ERROR but not its WARN."""
-
 
 def raised(diagnosis: Diagnosis, time: int) -> StandingAlarm | None:
     """Return the friction alarm raised by a record that was identified at `time`, ns, if any."""
@@ -71,22 +68,10 @@ def raised(diagnosis: Diagnosis, time: int) -> StandingAlarm | None:
 def followed(
     alarm: StandingAlarm, latest: Diagnosis, limits: FrictionLimits
 ) -> StandingAlarm | None:
-    """Return what remains of an alarm after the next record.
+    """Return what remains of an alarm after the next record, whose own diagnosis is `latest`.
 
-    Parameters
-    ----------
-    alarm : StandingAlarm
-        An alarm of an earlier record.
-    latest : Diagnosis
-        Diagnosis of the next record by itself.
-    limits : FrictionLimits
-        Bounds of the friction.
-
-    Returns
-    -------
-    StandingAlarm or None
-        The same alarm if that record leaves its level possible; a WARN if it surely clears the
-        ERROR but not the WARN; None if it surely clears both, or raises as severe an alarm itself.
+    It is the same alarm if that record leaves its level possible; a WARN if it surely clears the
+    ERROR but not the WARN; None if it surely clears both, or raises as severe an alarm itself.
     """
     side = alarm.state.side
     if side is None:
@@ -101,8 +86,8 @@ def limited(alarm: StandingAlarm, level: Level) -> StandingAlarm:
     """Return an alarm lowered to a level, WARN or ERROR, if it exceeds it."""
     if alarm.level <= level or alarm.state.side is None:
         return alarm
-    signal, state = StatusSignal.MAINTENANCE_REQUIRED, _LESSER[alarm.state.side]
-    return replace(alarm, level=level, status_signal=signal, state=state)
+    state = FrictionState.moved(alarm.state.side, level)
+    return replace(alarm, level=level, status_signal=state.status_signal, state=state)
 
 
 def standing(alarm: StandingAlarm | None, latest: Diagnosis) -> Diagnosis:
@@ -202,7 +187,11 @@ def identify_snapshot(snapshot: Snapshot, settings: MonitorSettings) -> Result:
         if not isinstance(refusal, RefusedRecordError):
             refusal = RefusedRecordError.of(refusal, {})
         raise RefusedRecordError(f"{refusal}{why}", refusal.numbers, refusal.is_fault) from refusal
-    return result if count == 1 else _of_means(result, count)
+    if count == 1:
+        return result
+    told = f"the record consists of averages of {count} successive samples"
+    evidence = {**result.evidence, "averaged_samples": count}
+    return replace(result, evidence=evidence, findings=(*result.findings, told))
 
 
 def identify_recording(recording: Recording, settings: MonitorSettings) -> Result:
@@ -241,16 +230,6 @@ def _no_estimate(reason: str | Statement) -> Diagnosis:
     return Diagnosis.of(FrictionState.UNKNOWN, said(Code.NO_ESTIMATE, reason=reason))
 
 
-def _of_means(result: Result, count: int) -> Result:
-    """Return a result whose evidence states how many samples each mean of its record covers."""
-    told = f"the record consists of averages of {count} successive samples"
-    return replace(
-        result,
-        evidence={**result.evidence, "averaged_samples": count},
-        findings=(*result.findings, told),
-    )
-
-
 class _Raised(NamedTuple):
     """Origin of the active alarm.
 
@@ -259,7 +238,7 @@ class _Raised(NamedTuple):
     """
 
     time: int
-    estimate: Result | EarlierEstimate | None
+    estimate: Estimate | None
     kept: StandingAlarm | None = None
     most: Level = Level.ERROR
 
@@ -274,22 +253,36 @@ class FrictionMonitor:
 
     Attributes
     ----------
+    settings : MonitorSettings
+        The settings in force (`change_settings`).
     buffer : RecordBuffer
         Buffer of both signals over the window.
+    result : Result or None
+        The latest result; a refusal leaves it in place.
+    earlier : EarlierEstimate or None
+        The estimate from before the monitor began; None once there is a result.
+    stamp : int or None
+        Time of the latest result or of the earlier estimate, ns.
+    known : KnownNumbers
+        Numbers of the valve beside its friction, including those of earlier records.
+    refusal : str or None
+        Why the latest identification was refused; None if it was not.
+    internal_error : str or None
+        The latest bug in an identification, until one succeeds.
     """
 
     def __init__(self, settings: MonitorSettings) -> None:
-        self._settings = settings
-        self._result: Result | None = None
-        self._known = KnownNumbers()
-        self._earlier: EarlierEstimate | None = None
-        self._raised: _Raised | None = None
-        self._stamp: int | None = None
-        self._refusal: str | None = None
-        self._refused, self._refused_last = 0, ""
-        self._internal_error: str | None = None
-        self._baseline: Baseline | None = None
+        self.settings = settings
         self.buffer = RecordBuffer(settings.valve, settings.window)
+        self.result: Result | None = None
+        self.earlier: EarlierEstimate | None = None
+        self.stamp: int | None = None
+        self.known = KnownNumbers()
+        self.refusal: str | None = None
+        self.internal_error: str | None = None
+        self._raised: _Raised | None = None
+        self._refused, self._refused_last = 0, ""
+        self._baseline: Baseline | None = None
 
     @property
     def baseline(self) -> Baseline | None:
@@ -298,24 +291,9 @@ class FrictionMonitor:
 
     @baseline.setter
     def baseline(self, baseline: Baseline | None) -> None:
-        self._baseline, self._known = baseline, self._known.since(self._stamp)
+        self._baseline, self.known = baseline, self.known.since(self.stamp)
         self._raised = None
         self._follow_alarm()
-
-    @property
-    def settings(self) -> MonitorSettings:
-        """The settings in force."""
-        return self._settings
-
-    @property
-    def result(self) -> Result | None:
-        """The latest result; a refusal leaves it in place."""
-        return self._result
-
-    @property
-    def stamp(self) -> int | None:
-        """Time of the latest result or of the earlier estimate, ns."""
-        return self._stamp
 
     @property
     def seen_until(self) -> int | None:
@@ -323,100 +301,77 @@ class FrictionMonitor:
 
         Both are ns since 1970 (UTC), as for the moves in service.
         """
-        if self._result is None:
-            return self._stamp
-        recording = self._result.recording
+        if self.result is None:
+            return self.stamp
+        recording = self.result.recording
         return round((recording.start_time + recording.duration) * 1e9)
 
     @property
-    def earlier(self) -> EarlierEstimate | None:
-        """The estimate from before the monitor began; None once there is a result."""
-        return self._earlier
-
-    @property
-    def estimate(self) -> Result | EarlierEstimate | None:
+    def estimate(self) -> Estimate | None:
         """The latest result, or else the earlier estimate."""
-        return self._result or self._earlier
-
-    @property
-    def known(self) -> KnownNumbers:
-        """Numbers of the valve beside its friction, including those of earlier records."""
-        return self._known
+        return self.result or self.earlier
 
     @property
     def changes(self) -> dict[str, Measured]:
         """Changes of the known numbers since the baseline; empty without a baseline."""
-        return (
-            {}
-            if self.baseline is None
-            else valve_changes(self._known.numbers, self.baseline.numbers)
-        )
+        baseline = self.baseline
+        return {} if baseline is None else valve_changes(self.known.numbers, baseline.numbers)
 
     @property
     def findings(self) -> tuple[Finding, ...]:
         """Changes of the valve beside its friction (`KnownNumbers.findings`)."""
-        settings = self._settings
-        return self._known.findings(self.baseline, settings.valve, settings.valve_limits)
+        settings = self.settings
+        return self.known.findings(self.baseline, settings.valve, settings.valve_limits)
 
     @property
     def held(self) -> Finding | None:
         """Finding that the latest test exceeded the friction limits without moving the stem."""
-        baseline, settings = self.baseline, self._settings
+        baseline, settings = self.baseline, self.settings
         if baseline is None:
             return None
-        return held_finding(self._known.of_latest, baseline, settings.valve, settings.limits)
+        return held_finding(self.known.of_latest, baseline, settings.valve, settings.limits)
 
     def may_have_changed(self) -> bool:
         """Return whether the far ends of the intervals show a change beside friction.
 
         An alarm on the whole valve clears only once they show none.
         """
-        baseline, settings = self.baseline, self._settings
+        baseline, settings = self.baseline, self.settings
         if baseline is None or not baseline.numbers:
             return False
-        numbers = farthest(self._known.numbers, baseline.numbers)
+        numbers = farthest(self.known.numbers, baseline.numbers)
         return bool(diagnose_numbers(numbers, baseline, settings.valve, settings.valve_limits))
 
     @property
     def common_factor(self) -> Measured | None:
         """Common factor of change of spring and friction, if there is one."""
-        return self._known.common_factor(self.baseline, self._settings.valve_limits)
-
-    @property
-    def refusal(self) -> str | None:
-        """Why the latest identification was refused; None if it was not."""
-        return self._refusal
-
-    @property
-    def internal_error(self) -> str | None:
-        """The latest bug in an identification, until one succeeds."""
-        return self._internal_error
+        return self.known.common_factor(self.baseline, self.settings.valve_limits)
 
     def change_settings(self, settings: MonitorSettings) -> None:
         """Apply new settings; a new window or valve clears the buffer.
 
         A new valve keeps only the numbers of the latest record.
         """
-        if settings.valve != self._settings.valve:
-            self._known = self._known.only_latest()
+        if settings.valve != self.settings.valve:
+            self.known = self.known.only_latest()
             self._raised = None
             self._follow_alarm()
-        if (settings.valve, settings.window) != (self._settings.valve, self._settings.window):
+        if (settings.valve, settings.window) != (self.settings.valve, self.settings.window):
             self.buffer = RecordBuffer(settings.valve, settings.window)
             self.buffer.clear(said(Code.CLEARED_AS_SETTINGS))
-        self._settings = settings
+        self.settings = settings
 
     def input(self) -> IdentificationInput:
         """Return a copy of the buffer with the present settings."""
-        return IdentificationInput(self.buffer.snapshot(), self._settings)
+        return IdentificationInput(self.buffer.snapshot(), self.settings)
 
     def remember(self, earlier: EarlierEstimate, known: KnownNumbers | None = None) -> None:
         """Continue with an estimate from before the monitor began, until there is a result.
 
         The numbers `known` from earlier records continue, too.
         """
-        self._earlier, self._stamp = earlier, earlier.time
-        self._known = (known or KnownNumbers()).with_record(earlier.numbers, earlier.time)
+        self.earlier, self.stamp = earlier, earlier.time
+        self.known = (known or KnownNumbers()).with_record(earlier.numbers, earlier.time)
         alarm = earlier.diagnosis.alarm
         if alarm is not None and self.baseline in (None, earlier.baseline):
             self._raised = _Raised(alarm.time, None, alarm)
@@ -434,24 +389,24 @@ class FrictionMonitor:
         self, result: Result, stamp: int, numbers: Mapping[str, Measured] | None = None
     ) -> None:
         """Store a result found at `stamp`, ns, with its `valve_numbers` if already computed."""
-        self._result, self._earlier, self._stamp = result, None, stamp
+        self.result, self.earlier, self.stamp = result, None, stamp
         found = valve_numbers(result) if numbers is None else numbers
-        self._known = self._known.followed_by(found, stamp)
-        self._refusal = self._internal_error = None
+        self.known = self.known.followed_by(found, stamp)
+        self.refusal = self.internal_error = None
         self._refused = 0
         self._follow_alarm()
 
     def _follow_alarm(self) -> None:
         """Let the latest estimate raise, keep or clear an alarm."""
         latest = self.estimate
-        if latest is None or self._stamp is None:
+        if latest is None or self.stamp is None:
             return
         own, alarm = self._diagnosis_of(latest), self._alarm()
-        left = None if alarm is None else followed(alarm, own, self._settings.limits)
+        left = None if alarm is None else followed(alarm, own, self.settings.limits)
         if left is not None and self._raised is not None:
             self._raised = self._raised._replace(most=left.level)
         else:
-            self._raised = None if own.state.side is None else _Raised(self._stamp, latest)
+            self._raised = None if own.state.side is None else _Raised(self.stamp, latest)
 
     def _alarm(self) -> StandingAlarm | None:
         """Return the active alarm, by the present baseline and limits."""
@@ -465,11 +420,11 @@ class FrictionMonitor:
     def learn(self, numbers: Mapping[str, Measured], stamp: int) -> None:
         """Store the numbers of the valve from a refused record, found at `stamp`, ns."""
         if numbers:
-            self._known = self._known.followed_by(numbers, stamp)
+            self.known = self.known.followed_by(numbers, stamp)
 
     def refuse(self, refusal: RefusalError) -> None:
         """Store the refusal of an identification."""
-        self._refusal = str(refusal)
+        self.refusal = str(refusal)
         self.skip(refusal)
 
     def skip(self, refusal: RefusalError) -> None:
@@ -489,22 +444,22 @@ class FrictionMonitor:
 
     def fail(self, internal_error: str) -> None:
         """Store the bug that ended an identification."""
-        self._internal_error = internal_error
+        self.internal_error = internal_error
 
     def result_as_baseline(self) -> Baseline:
         """Return the frictions of the latest result, without making them the baseline.
 
         Raises RefusalError if there is no result, or `Baseline.of` refuses it.
         """
-        if self._result is None:
+        if self.result is None:
             raise RefusalError("the valve has no result to take as baseline: identify it first")
-        return Baseline.of(self._result)
+        return Baseline.of(self.result)
 
     def baseline_lacks(self) -> tuple[BaselineLack, ...]:
         """Return the conditions of a baseline that the latest result fails."""
-        if self._result is None:
+        if self.result is None:
             return (BaselineLack("result", Lack.RESULT),)
-        return Baseline.lacks(self._result)
+        return Baseline.lacks(self.result)
 
     def diagnosis(self, now: int | None = None, is_watched: bool = True) -> Diagnosis:
         """Return the diagnosis by the latest result, also after a refusal; OK without a result.
@@ -514,38 +469,36 @@ class FrictionMonitor:
         A bug in an identification raises the level to ERROR until an identification succeeds.
         """
         diagnosis = self._diagnosis_by_result(now, is_watched)
-        if self._internal_error is None:
+        if self.internal_error is None:
             return diagnosis
-        failed = said(Code.FAILED, error=self._internal_error, of=diagnosis.statement)
+        failed = said(Code.FAILED, error=self.internal_error, of=diagnosis.statement)
         if diagnosis.level >= Level.ERROR:
             return replace(diagnosis, statement=failed)
         return Diagnosis(Level.ERROR, StatusSignal.CHECK_FUNCTION, failed, diagnosis.ratio)
 
     def _diagnosis_by_result(self, now: int | None, is_watched: bool) -> Diagnosis:
-        if (estimate := self.estimate) is not None:
-            diagnosis = self._with_alarm(estimate)
-            if not is_watched:
-                diagnosis = diagnosis.of_before(self._stamp if self._earlier is None else None)
-            if self._earlier is not None and now is not None:
-                age = now - self._earlier.time
-                aged = said(Code.AGED, of=diagnosis.statement, age=age)
-                diagnosis = replace(diagnosis, statement=aged)
-        else:
-            return _no_estimate(self._refusal or said(Code.NOTHING_IDENTIFIED))
-        if self._refusal is None:
+        if (estimate := self.estimate) is None:
+            return _no_estimate(self.refusal or said(Code.NOTHING_IDENTIFIED))
+        diagnosis = self._with_alarm(estimate)
+        if not is_watched:
+            diagnosis = diagnosis.of_before(self.stamp if self.earlier is None else None)
+        if self.earlier is not None and now is not None:
+            aged = said(Code.AGED, of=diagnosis.statement, age=now - self.earlier.time)
+            diagnosis = replace(diagnosis, statement=aged)
+        if self.refusal is None:
             return diagnosis
-        refused = said(Code.REFUSED, reason=self._refusal, of=diagnosis.statement)
+        refused = said(Code.REFUSED, reason=self.refusal, of=diagnosis.statement)
         return replace(diagnosis, statement=refused)
 
-    def _with_alarm(self, estimate: Result | EarlierEstimate) -> Diagnosis:
+    def _with_alarm(self, estimate: Estimate) -> Diagnosis:
         """Return the diagnosis by the latest estimate, with the alarm that it does not clear."""
         latest = self._diagnosis_of(estimate)
         if self._raised is not None and self._raised.estimate is estimate:
             return latest
         return standing(self._alarm(), latest)
 
-    def _diagnosis_of(self, estimate: Result | EarlierEstimate) -> Diagnosis:
-        valve, limits = self._settings.valve, self._settings.limits
+    def _diagnosis_of(self, estimate: Estimate) -> Diagnosis:
+        valve, limits = self.settings.valve, self.settings.limits
         if isinstance(estimate, Result):
             found = diagnose(estimate, valve, self.baseline, limits)
         else:

@@ -71,9 +71,10 @@ class KnownNumbers:
         for end, stop, side in _ENDS:
             if end not in fresh or stop in fresh:
                 continue
-            if stop in dated and _is_beyond(fresh[end], dated[stop].number, side):
+            now, met, farthest = fresh[end], dated.get(stop), dated.get(end)
+            if met and side * (now.value - met.value) > now.half_width + met.half_width:
                 del dated[stop]
-            if end in dated and not _is_farther(fresh[end], dated[end].number, side):
+            if farthest and not side * (now.value - farthest.value) >= 0:
                 del fresh[end]
         dated |= {n: DatedNumber(time, one.value, one.half_width) for n, one in fresh.items()}
         return KnownNumbers(dated, time)
@@ -114,12 +115,3 @@ class KnownNumbers:
             return finding
         dated = said(Code.MEASURED_EARLIER, of=finding.statement, time=min(times))
         return replace(finding, statement=dated)
-
-
-def _is_farther(end: Measured, before: Measured, side: float) -> bool:
-    return side * (end.value - before.value) >= 0
-
-
-def _is_beyond(end: Measured, stop: Measured, side: float) -> bool:
-    """Return whether the stem has surely gone beyond a stop."""
-    return side * (end.value - stop.value) > end.half_width + stop.half_width

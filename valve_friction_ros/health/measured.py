@@ -118,8 +118,8 @@ DIFFERENCES = {
 """Numbers compared by their difference, with their units."""
 
 
-def _ratio(now: Measured, healthy: Measured) -> Measured | None:
-    """Return a number over its baseline.
+def ratio_of(now: Measured, healthy: Measured) -> Measured | None:
+    """Return a number over its baseline; None unless both are above zero.
 
     The relative half widths of independent measurements add in squares, and the interval is
     symmetric in the logarithm. Where the interval of either number reaches zero, the interval of
@@ -147,7 +147,7 @@ def valve_changes(
 ) -> dict[str, Measured]:
     """Return the changes of the common numbers by name, as in `RATIOS` and `DIFFERENCES`."""
     both = now.keys() & healthy.keys()
-    changes = {name: _ratio(now[name], healthy[name]) for name in RATIOS if name in both}
+    changes = {name: ratio_of(now[name], healthy[name]) for name in RATIOS if name in both}
     found = {name: change for name, change in changes.items() if change is not None}
     return found | {
         name: difference(now[name], healthy[name]) for name in DIFFERENCES if name in both

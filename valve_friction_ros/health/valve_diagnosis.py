@@ -17,7 +17,7 @@ from typing import NamedTuple
 from valve_friction_ros.health.baseline import Baseline
 from valve_friction_ros.health.diagnosis import Diagnosis, FrictionLimits, diagnose
 from valve_friction_ros.health.levels import Finding, Level, StatusSignal
-from valve_friction_ros.health.measured import Measured, difference, valve_changes
+from valve_friction_ros.health.measured import Measured, difference, ratio_of, valve_changes
 from valve_friction_ros.health.valve_numbers import valve_numbers
 from valve_friction_ros.identification import Result
 from valve_friction_ros.model.drive import Drive
@@ -88,61 +88,6 @@ class ValveLimits:
             )
 
 
-_SIDES = {
-    "lower_stop": ("lowest_position", -1.0),
-    "upper_stop": ("highest_position", 1.0),
-}
-
-
-def stop_findings(
-    now: Mapping[str, Measured], healthy: Mapping[str, Measured], valve: Valve, share: float
-) -> Iterator[Finding]:
-    """Find stops that have surely moved by more than a share of the travel.
-
-    A stop that only the present record met is compared with the range of motion of the baseline: if
-    the baseline went farther, travel is lost. A baseline stop that the stem has now passed has
-    moved outward. If the other stop has not moved, the zero of the position sensor is excluded as a
-    cause, and its span remains. If only this stop is comparable, either may be the cause.
-    """
-    bound = share * valve.travel
-    moved = _moved(now, healthy, bound)
-    changes = list(moved.values())
-    if len(changes) == len(_SIDES) and changes[0].agrees_with(changes[1]):
-        yield _maintenance(said(Code.STOPS_MOVED_ALIKE, change=changes[0].interval), *moved)
-        return
-    sensor = "BOTH" if len(moved) == len(_SIDES) else "EITHER"
-    if any(name in now and name in healthy for name in _SIDES.keys() - moved.keys()):
-        sensor = "SPAN"
-    for name, change in moved.items():
-        end, side = _SIDES[name]
-        is_lost = side * change.value < 0
-        code = Code.TRAVEL_LOST if is_lost else Code.STOP_MOVED_OUTWARD
-        statement = said(code, stop=name, change=change.interval, sensor=sensor)
-        yield _maintenance(statement, name if is_lost or name in now else end)
-
-
-def _moved(
-    now: Mapping[str, Measured], healthy: Mapping[str, Measured], bound: float
-) -> dict[str, Measured]:
-    """Return the changes of the stops that have surely moved by more than a bound, m."""
-    moved = {}
-    for name, (end, side) in _SIDES.items():
-        if name not in now:
-            if end in now and name in healthy:
-                change = difference(now[end], healthy[name])
-                if change.times(side).beyond(-float("inf"), bound):
-                    moved[name] = change
-        elif name in healthy:
-            change = difference(now[name], healthy[name])
-            if change.beyond(-bound, bound):
-                moved[name] = change
-        elif end in healthy:
-            change = difference(now[name], healthy[end])
-            if change.times(side).beyond(-bound, float("inf")):
-                moved[name] = change
-    return moved
-
-
 class ValveDiagnosis(NamedTuple):
     """Diagnosis of the friction of a valve, and its other findings."""
 
@@ -155,7 +100,8 @@ def diagnose_valve(
 ) -> ValveDiagnosis:
     """Compare friction (`diagnose`) and other numbers of a result with the baseline.
 
-    The diagnosis of the friction states if a common factor explains both friction and spring.
+    The diagnosis of the friction states if a common factor explains both friction and spring. There
+    are no other findings without a baseline, or with a baseline of friction alone.
     """
     friction = diagnose(result, result.valve, baseline, limits)
     if baseline is None or not baseline.numbers:
@@ -166,32 +112,6 @@ def diagnose_valve(
         qualified(friction, factor, result.valve),
         diagnose_numbers(numbers, baseline, result.valve),
     )
-
-
-def diagnose_parameters(
-    result: Result, baseline: Baseline | None, limits: ValveLimits | None = None
-) -> tuple[Finding, ...]:
-    """Compare the numbers of a valve in a result with the baseline (`diagnose_numbers`).
-
-    The result is empty without a baseline, or with a baseline of friction alone.
-
-    Examples
-    --------
-    >>> import valve_friction_ros as vf
-    >>> from valve_friction_ros.health import diagnose_parameters
-    >>> valve = vf.Valve(diaphragm_area=0.0445, travel=28.575e-3)
-    >>> pressure = 6.5e4 + 5e4 * np.sin(2 * np.pi * np.arange(4000) / 1000)
-    >>> def identified(spring_constant):
-    ...     packing = vf.KarnoppParameters(1.6, 4865.0, 150.0, 150.0, spring_constant)
-    ...     stem = vf.simulate(valve, packing, pressure, sample_period=0.01)
-    ...     return vf.identify(vf.Recording(0.01, pressure, stem.position), valve)
-    >>> healthy = vf.Baseline.of(identified(2.05e5))
-    >>> [str(one)[:58] for one in diagnose_parameters(identified(1.37e5), healthy)]
-    ['ERROR: the spring constant has changed: 0.668 times (0.66']
-    """
-    if baseline is None or not baseline.numbers:
-        return ()
-    return diagnose_numbers(valve_numbers(result), baseline, result.valve, limits)
 
 
 def diagnose_numbers(
@@ -234,7 +154,7 @@ def diagnose_numbers(
         *_viscous(case, factor),
         *_preload(case),
         *_asymmetry(case),
-        *stop_findings(case.now, case.healthy, case.valve, case.limits.stop_change),
+        *_stops(case),
         *_noises(case, has_scaled=factor is not None),
         *_lag(case),
     )
@@ -263,11 +183,6 @@ class _Case:
         """The name of the drive."""
         return self.valve.driven_by.name
 
-    @property
-    def spring_change(self) -> Measured | None:
-        """Ratio of the spring constants where it is surely beyond its bound."""
-        return spring_change(self.changes, self.limits)
-
 
 def _maintenance(statement: Statement, *numbers: str) -> Finding:
     return Finding(Level.WARN, StatusSignal.MAINTENANCE_REQUIRED, statement, numbers)
@@ -292,7 +207,7 @@ def _common_scale(case: _Case, factor: Measured) -> Iterator[Finding]:
 
 
 def _spring(case: _Case) -> Iterator[Finding]:
-    change = case.spring_change
+    change = _spring_change(case.changes, case.limits)
     if change is None:
         return
     share, value = case.limits.spring_failure, case.now["spring_constant"].value
@@ -340,7 +255,7 @@ def _preload_ratio(case: _Case) -> Measured | None:
         return None
     if min(now.value - now.half_width, healthy.value - healthy.half_width) <= 0:
         return None
-    return valve_changes({"spring_constant": now}, {"spring_constant": healthy})["spring_constant"]
+    return ratio_of(now, healthy)
 
 
 def _preload(case: _Case) -> Iterator[Finding]:
@@ -348,7 +263,7 @@ def _preload(case: _Case) -> Iterator[Finding]:
     bound *= case.limits.preload_change
     if shift is None or not shift.beyond(-bound, bound):
         return
-    spring, ratio = case.spring_change, _preload_ratio(case)
+    spring, ratio = _spring_change(case.changes, case.limits), _preload_ratio(case)
     if spring is not None and ratio is not None and ratio.agrees_with(spring):
         return  # the same spring, as far compressed as before
     statement = said(
@@ -420,6 +335,54 @@ def _asymmetry(case: _Case) -> Iterator[Finding]:
         yield _maintenance(statement, "viscous_asymmetry")
 
 
+_SIDES = {
+    "lower_stop": ("lowest_position", -1.0),
+    "upper_stop": ("highest_position", 1.0),
+}
+
+
+def _stops(case: _Case) -> Iterator[Finding]:
+    """Find stops that have surely moved by more than their share of the travel.
+
+    A stop that only the present record met is compared with the range of motion of the baseline: if
+    the baseline went farther, travel is lost. A baseline stop that the stem has now passed has
+    moved outward. If the other stop has not moved, the zero of the position sensor is excluded as a
+    cause, and its span remains. If only this stop is comparable, either may be the cause.
+    """
+    moved = _moved(case)
+    changes = list(moved.values())
+    if len(changes) == len(_SIDES) and changes[0].agrees_with(changes[1]):
+        yield _maintenance(said(Code.STOPS_MOVED_ALIKE, change=changes[0].interval), *moved)
+        return
+    sensor = "BOTH" if len(moved) == len(_SIDES) else "EITHER"
+    if any(name in case.now and name in case.healthy for name in _SIDES.keys() - moved.keys()):
+        sensor = "SPAN"
+    for name, change in moved.items():
+        end, side = _SIDES[name]
+        is_lost = side * change.value < 0
+        code = Code.TRAVEL_LOST if is_lost else Code.STOP_MOVED_OUTWARD
+        statement = said(code, stop=name, change=change.interval, sensor=sensor)
+        yield _maintenance(statement, name if is_lost or name in case.now else end)
+
+
+def _moved(case: _Case) -> dict[str, Measured]:
+    """Return the changes of the stops that have surely moved by more than their bound, m."""
+    bound = case.limits.stop_change * case.valve.travel
+    moved = {}
+    for name, (end, side) in _SIDES.items():
+        now, healthy = case.now.get(name), case.healthy.get(name)
+        low, high = -bound, bound
+        if now is None:  # only a stem beyond the healthy stop shows that it has moved
+            now, low = case.now.get(end), -math.inf
+        elif healthy is None:  # only a stop short of the healthy way
+            healthy, high = case.healthy.get(end), math.inf
+        if now is not None and healthy is not None:
+            change = difference(now, healthy)
+            if change.times(side).beyond(low, high):
+                moved[name] = change
+    return moved
+
+
 def _noises(case: _Case, has_scaled: bool) -> Iterator[Finding]:
     """Find growth of noise, unless a new scale of the drive explains the noise of the drive."""
     signals = {"drive_noise": case.drive, "stem_noise": "STEM"}
@@ -451,7 +414,7 @@ def drive_scale(valve: Valve) -> Statement:
     return said(code, drive=valve.driven_by.name)
 
 
-def spring_change(changes: Mapping[str, Measured], limits: ValveLimits) -> Measured | None:
+def _spring_change(changes: Mapping[str, Measured], limits: ValveLimits) -> Measured | None:
     """Return the ratio of the spring constants where it is surely beyond its bound."""
     change, share = changes.get("spring_constant"), limits.spring_change
     return change if change is not None and change.beyond(1 - share, 1 + share) else None
@@ -462,7 +425,7 @@ def common_factor(changes: Mapping[str, Measured], limits: ValveLimits) -> Measu
 
     Return None if the spring constant has not surely changed, or the frictions not by its factor.
     """
-    spring, coulomb = spring_change(changes, limits), changes.get("coulomb_friction")
+    spring, coulomb = _spring_change(changes, limits), changes.get("coulomb_friction")
     if spring is None or coulomb is None or coulomb.holds(1.0) or not _is_narrow(coulomb):
         return None
     others = [changes.get(name) for name in ("static_friction", "viscous_friction")]

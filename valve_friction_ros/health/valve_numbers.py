@@ -76,26 +76,14 @@ _RECENT = 0.5
 
 
 def stem_reach(recording: Recording, valve: Valve, slip_force: float) -> dict[str, Measured]:
-    """Return the ends of the stem's motion, m, and which of them are stops.
+    """Return the ends of the stem's motion, m, and the stops that it met.
+
+    These are ``lowest_position``, ``highest_position``, ``lower_stop`` and ``upper_stop``.
 
     A stem at rest moves on as soon as the force has grown by F_s − F_c in the same direction. If it
-    rests at an end of its motion while the force grows by far more, a stop holds it. An unknown
-    F_s − F_c is estimated from rests between the ends. Without such a rest, growth by F_c is
-    required.
-
-    Parameters
-    ----------
-    recording : Recording
-        Drive and stem.
-    valve : Valve
-        Converts the drive to force.
-    slip_force : float
-        Largest possible F_s − F_c, N; nan where it is unknown.
-
-    Returns
-    -------
-    dict
-        ``lowest_position`` and ``highest_position``; ``lower_stop`` and ``upper_stop`` where met.
+    rests at an end of its motion while the force grows by far more, a stop holds it. `slip_force`
+    is the largest possible F_s − F_c, N. If it is nan, it is estimated from rests between the ends.
+    Without such a rest, growth by F_c is required.
     """
     mean = max(round(_MEAN / recording.sample_period), 1)
     position = scipy.ndimage.uniform_filter1d(recording.position, mean, mode="nearest")
@@ -268,7 +256,6 @@ A weak viscous friction cannot be distinguished from a lag or from friction that
 It changes with either, and with the motion."""
 
 _COULOMB = "coulomb_friction"
-_DOUBTED = "slip_force"
 _OF_THE_BALANCE = ("spring_constant", "spring_preload")
 _SLIP_SHARE = 0.5
 """Share of a slip force by which it may be wrong, whatever the law of the friction.
@@ -305,9 +292,9 @@ def valve_numbers(result: Result) -> dict[str, Measured]:
         if result.parameters[name].without_calibration.verdict is not Verdict.IDENTIFIED:
             fit.pop(name, None)
     if result.misfit is not None and not result.misfit.describes:
-        identified = (name for name in _OF_THE_BALANCE if name in result.parameters)
-        sure = [n for n in identified if result.parameters[n].verdict is Verdict.IDENTIFIED]
-        fit = {name: one for name, one in fit.items() if name in (_DOUBTED, *sure)}
+        balance = {n: result.parameters[n] for n in _OF_THE_BALANCE if n in result.parameters}
+        sure = [name for name, one in balance.items() if one.verdict is Verdict.IDENTIFIED]
+        fit = {name: one for name, one in fit.items() if name in ("slip_force", *sure)}
     slip = fit.get("slip_force")
     largest = math.nan if slip is None else max(slip.value, 0.0) + slip.half_width
     numbers = sensor_noises(result.recording)

@@ -366,7 +366,7 @@ def response_section(response: ResponseSummary) -> Section | None:
         ),
     )
     causes = " ".join(
-        f"{capitalised(name)}: {member_words(response.cause(which), 'cause')}."
+        f"{capitalised(name)}: {member_words(response.cause(which).name, 'cause')}."
         for name, which in _CAUSES
     )
     words = (

@@ -24,7 +24,7 @@ from jinja2.filters import do_mark_safe
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from valve_friction_ros.page_template import page_environment
+from valve_friction_ros.outside_text import page_environment
 from valve_friction_ros.records.files import write_whole
 
 _SYMBOL = re.compile(r"(?<![\w.])([FPRSTakv]|σ|R²)_(ref|[a-z0-9])(?!\w|\.\w)")

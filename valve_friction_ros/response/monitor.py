@@ -24,7 +24,7 @@ from valve_friction_ros.response.moves import (
     evaluated,
     hunting,
 )
-from valve_friction_ros.response.summary import ResponseSummary, Spread, summarised
+from valve_friction_ros.response.summary import Spread, summarised
 from valve_friction_ros.streams import Arrivals, Kind, Samples
 from valve_friction_ros.streams.samples import SampleBuffer
 
@@ -73,6 +73,18 @@ class ResponseMonitor:
         Travel of the stem, m; finite.
     earlier : sequence of StepAnswer
         Earlier moves, oldest first; only the latest are kept.
+
+    Attributes
+    ----------
+    summary : ResponseSummary
+        Summary of the latest 200 moves.
+    left_out : int
+        Number of changes of the command that are no evaluated moves.
+    hunting : Hunting or None
+        The present limit cycle.
+    clock_offset : float
+        Lead of the latest command over the stem, s; negative for a lag, 0 if small. A command more
+        than 10 s ahead waits. A command more than 60 s behind finds no samples.
     """
 
     def __init__(self, travel: float, earlier: Sequence[StepAnswer] = ()) -> None:
@@ -82,7 +94,7 @@ class ResponseMonitor:
         self._moves: deque[StepAnswer] = deque(earlier, maxlen=_RECENT)
         self._ended: deque[StepAnswer] = deque(maxlen=_RECENT)
         self.left_out = 0
-        self._summary = summarised(tuple(self._moves))
+        self.summary = summarised(tuple(self._moves))
         self.forget()
 
     def forget(self) -> None:
@@ -92,13 +104,13 @@ class ResponseMonitor:
         self._fast = {kind: SampleBuffer(_LONGEST + 5.0) for kind in _SIGNALS}
         self._slow = {kind: SampleBuffer(_HUNTING_WINDOW) for kind in _SIGNALS}
         self._wanted = SampleBuffer(_HUNTING_WINDOW)
-        self._offset = 0.0
+        self.clock_offset = 0.0
         self._command = math.nan
         self._steady_since: int | None = None
         self._change: CommandStep | None = None
         self._look_at = 0
         self._hunting_at = 0
-        self._hunting: Hunting | None = None
+        self.hunting: Hunting | None = None
         self._away: deque[tuple[float, float]] = deque(maxlen=_HOUR)
         self._second: list[float] = []
         self._second_of = 0
@@ -107,24 +119,6 @@ class ResponseMonitor:
     def has_command(self) -> bool:
         """Whether a command has arrived."""
         return math.isfinite(self._command)
-
-    @property
-    def clock_offset(self) -> float:
-        """Lead of the latest command over the stem, s; negative for a lag, 0 if small.
-
-        A command more than 10 s ahead waits. A command more than 60 s behind finds no samples.
-        """
-        return self._offset
-
-    @property
-    def hunting(self) -> Hunting | None:
-        """The present limit cycle, or None."""
-        return self._hunting
-
-    @property
-    def summary(self) -> ResponseSummary:
-        """Summary of the latest 200 moves."""
-        return self._summary
 
     def drain(self) -> tuple[StepAnswer, ...]:
         """Return the moves that ended since the last call, at most the latest 200."""
@@ -164,14 +158,14 @@ class ResponseMonitor:
 
     def _compare_clocks(self, command: Samples, before: int | None, newest: int | None) -> None:
         """Note whether the latest command is far ahead of the stem, or far behind it."""
-        if newest is None or not (command.stamps.size or self._offset > 0):
+        if newest is None or not (command.stamps.size or self.clock_offset > 0):
             return
         last = self._ahead[-1][0] if self._ahead else newest
         ahead = (last - newest) / 1e9
         behind = 0.0
         if before is not None and command.stamps.size:
             behind = (before - int(command.stamps[-1])) / 1e9
-        self._offset = ahead if ahead > _AHEAD else -behind if behind > _BEHIND else 0.0
+        self.clock_offset = ahead if ahead > _AHEAD else -behind if behind > _BEHIND else 0.0
 
     def _taken_command(self, newest: int | None) -> list[CommandStep]:
         """Take the command up to the newest sample of the stem; later commands wait."""
@@ -225,7 +219,7 @@ class ResponseMonitor:
     def _follow(self, change: CommandStep) -> None:
         """End the present move, and begin the next."""
         self._end(change.stamp)
-        self._steady_since, self._hunting = change.stamp, None
+        self._steady_since, self.hunting = change.stamp, None
         if change.is_step and change.held >= _SHORTEST:
             self._change = change
             self._look_at = change.stamp + round(_FIRST_LOOK * _SECOND)
@@ -243,7 +237,7 @@ class ResponseMonitor:
             return
         self._moves.append(move)
         self._ended.append(move)
-        self._summary = summarised(tuple(self._moves))
+        self.summary = summarised(tuple(self._moves))
 
     def _move(self, change: CommandStep, end: int) -> StepAnswer | None:
         stem, pressure = (self._fast[kind].samples() for kind in (Kind.POSITION, Kind.PRESSURE))
@@ -264,7 +258,7 @@ class ResponseMonitor:
             self._hunting_at = newest + round(_HUNTING_PERIOD * _SECOND)
             stem, pressure = (self._slow[kind].samples() for kind in (Kind.POSITION, Kind.PRESSURE))
             wanted = self._wanted.samples()
-            self._hunting = hunting(stem, pressure, wanted, self._steady_since, self._travel)
+            self.hunting = hunting(stem, pressure, wanted, self._steady_since, self._travel)
 
 
 def _first_of_ticks(stamps: NDArray[np.int64], tick: int, last: int | None) -> NDArray[np.bool_]:

@@ -247,23 +247,10 @@ def _steady(values: _Values) -> float:
 def evaluated(
     change: CommandStep, stem: Samples, pressure: Samples, end: int, travel: float
 ) -> StepAnswer | None:
-    """Evaluate the move after a step of the command.
+    """Evaluate the move after a step of the command, from signals in m and Pa that begin before it.
 
-    Parameters
-    ----------
-    change : CommandStep
-        The step, m.
-    stem, pressure : Samples
-        Position, m, and pressure, Pa, from before the step on.
-    end : int
-        When the stem settled or the next command came, ns.
-    travel : float
-        Travel, m.
-
-    Returns
-    -------
-    StepAnswer or None
-        None if the signals do not cover the step.
+    It lasts to `end`, ns, when the stem settled or the next command came. None if the signals do
+    not cover the step.
     """
     before = change.stamp - round(min(_BEFORE, change.held / 2) * 1e9)
     covered = all(s.stamps.size and s.stamps[0] <= before for s in (stem, pressure))
@@ -433,22 +420,11 @@ def _own_swing(turns: _Values, times: _Values, wanted: _Values) -> float:
 def hunting(
     stem: Samples, pressure: Samples, wanted: Samples, since: int, travel: float
 ) -> Hunting | None:
-    """Look for a limit cycle while the command is constant.
+    """Look for a limit cycle while the command is constant, from a time `since`, ns, on.
 
-    Parameters
-    ----------
-    stem, pressure, wanted : Samples
-        Position, m, pressure, Pa, and command, m, at about ten samples per second; the command may
-        come only when it changes.
-    since : int
-        Time from which the command is constant, ns.
-    travel : float
-        Travel, m.
-
-    Returns
-    -------
-    Hunting or None
-        None without five regular swings, or if the command itself swings with the stem.
+    Position, m, pressure, Pa, and command, m, have about ten samples per second; the command may
+    come only when it changes. None without five regular swings, or if the command itself swings
+    with the stem.
     """
     held = stem.stamps >= since
     times, x = (stem.stamps[held] - since) / 1e9, stem.values[held] / travel

@@ -184,35 +184,6 @@ _FROM_STOP = 0.1
 on its seat up to a few percent (cut-off). Chosen."""
 
 
-@dataclass(frozen=True)
-class IgnoredSteps:
-    """The latest large steps, most of which the stem ignored.
-
-    Attributes
-    ----------
-    latest : tuple of StepAnswer
-        The steps, including those that the stem answered.
-    least : float
-        Size from which a step is large, share of the travel.
-    """
-
-    latest: tuple[StepAnswer, ...]
-    least: float
-
-    @property
-    def number(self) -> int:
-        """Number of ignored steps."""
-        return sum(map(has_ignored, self.latest))
-
-    @property
-    def cause(self) -> AnswerCause:
-        """Cause by the response of the pressure."""
-        answered = [math.isfinite(m.pressure_delay) for m in self.latest if has_ignored(m)]
-        if all(answered):
-            return AnswerCause.PRESSURE_ANSWERS
-        return AnswerCause.PRESSURE_ANSWERS_SOME if any(answered) else AnswerCause.PRESSURE_SILENT
-
-
 def has_ignored(move: StepAnswer) -> bool:
     """Return whether a step lasted long enough but did not move the stem."""
     return not move.moved and move.held >= ANSWER_TIME
@@ -229,28 +200,6 @@ def large_step(moves: Sequence[StepAnswer], dead_band: float = math.nan) -> floa
     # Commands of the same size differ by rounding.
     usual = (1 - 1e-6) * float(np.median(sizes)) if sizes else _LARGE_STEP
     return min(max(usual, _LEAST_STEP), (1 - 1e-6) * _LARGE_STEP)
-
-
-def ignored_steps(moves: Sequence[StepAnswer], dead_band: float = math.nan) -> IgnoredSteps | None:
-    """Return the latest five large steps if the stem answered at most one; else None.
-
-    Parameters
-    ----------
-    moves : sequence of StepAnswer
-        Oldest first.
-    dead_band : float
-        Share of the travel; nan if unknown.
-    """
-    least = large_step(moves, dead_band)
-    large = [
-        m
-        for m in moves
-        if abs(m.change) >= (max(least, _FROM_STOP) if m.at_stop else least)
-        and (m.moved or has_ignored(m))
-    ]
-    found = IgnoredSteps(tuple(large[-_LATEST:]), least)
-    enough = len(found.latest) == _LATEST
-    return found if enough and found.number >= _LATEST - _MOST_ANSWERED else None
 
 
 SIZES = (0.0, 0.005, 0.01, 0.02, 0.05, 0.1, math.inf)
@@ -430,6 +379,26 @@ def _warning(code: Code, cause: AnswerCause, **facts: float) -> Finding:
     return Finding(Level.WARN, StatusSignal.MAINTENANCE_REQUIRED, statement)
 
 
+def _steps_ignored(moves: Sequence[StepAnswer], dead_band: float) -> Finding | None:
+    """Find that the stem answered at most one of the latest five large steps."""
+    least = large_step(moves, dead_band)
+    latest = [
+        m
+        for m in moves
+        if abs(m.change) >= (max(least, _FROM_STOP) if m.at_stop else least)
+        and (m.moved or has_ignored(m))
+    ][-_LATEST:]
+    with_pressure = [math.isfinite(m.pressure_delay) for m in latest if has_ignored(m)]
+    if len(latest) < _LATEST or len(with_pressure) < _LATEST - _MOST_ANSWERED:
+        return None
+    cause = AnswerCause.PRESSURE_SILENT
+    if any(with_pressure):
+        is_all = all(with_pressure)
+        cause = AnswerCause.PRESSURE_ANSWERS if is_all else AnswerCause.PRESSURE_ANSWERS_SOME
+    number, steps = len(with_pressure), len(latest)
+    return _warning(Code.STEPS_IGNORED, cause, number=number, steps=steps, least=least)
+
+
 def response_findings(
     summary: ResponseSummary,
     limits: ResponseLimits,
@@ -441,18 +410,8 @@ def response_findings(
     These are ignored large steps, a median of at least five moves beyond its limit, and hunting.
     The dead band is a share of the travel, nan if unknown.
     """
-    findings = []
-    ignored = ignored_steps(summary.moves, dead_band)
-    if ignored is not None:
-        findings.append(
-            _warning(
-                Code.STEPS_IGNORED,
-                ignored.cause,
-                number=ignored.number,
-                steps=len(ignored.latest),
-                least=ignored.least,
-            )
-        )
+    ignored = _steps_ignored(summary.moves, dead_band)
+    findings = [] if ignored is None else [ignored]
     late = summary.least_dead_time(dead_band)
     for code, name, spread, limit in (
         (Code.ANSWER_LATE, "dead_time", late, limits.dead_time),

@@ -252,27 +252,25 @@ class DataFault:
 
     def _rejected(self, valve: Valve, joint: str) -> Statement:
         signal, cause = self.signal or Signal.POSITION, self.cause or SampleFault.NOT_FINITE
-        facts: dict[str, object] = {"cause": cause.name}
-        code = Code.REJECTED_FOR
         if cause is SampleFault.NO_JOINT:
-            code, facts = Code.REJECTED_WITHOUT_JOINT, {"joint": joint or None}
-        elif cause is SampleFault.OUT_OF_RANGE:
-            is_pressure = signal is Signal.PRESSURE
-            low, high = valve.pressure_minimum, valve.pressure_maximum
-            code = Code.PRESSURE_OUT_OF_RANGE if is_pressure else Code.POSITION_OUT_OF_RANGE
-            facts = {"reading": self.reading, "lowest": low, "highest": high}
-            if not is_pressure:
-                facts = {"reading": self.reading, "highest": MOST_POSITION}
-        usable = said(Code.NONE_USABLE)
-        if math.isfinite(self.unusable):
+            why = said(Code.REJECTED_WITHOUT_JOINT, joint=joint or None)
+        elif cause is not SampleFault.OUT_OF_RANGE:
+            why = said(Code.REJECTED_FOR, cause=cause.name)
+        elif signal is Signal.POSITION:
+            why = said(Code.POSITION_OUT_OF_RANGE, reading=self.reading, highest=MOST_POSITION)
+        else:
+            why = said(
+                Code.PRESSURE_OUT_OF_RANGE,
+                reading=self.reading,
+                lowest=valve.pressure_minimum,
+                highest=valve.pressure_maximum,
+            )
+        usable = None
+        if self.share == 1.0 and math.isfinite(self.unusable):
             usable = said(Code.LAST_USABLE, seconds=self.unusable)
-        return said(
-            Code.REJECTED,
-            signal=signal.value,
-            share=self.share,
-            usable=usable if self.share == 1.0 else None,
-            why=said(code, **facts),
-        )
+        elif self.share == 1.0:
+            usable = said(Code.NONE_USABLE)
+        return said(Code.REJECTED, signal=signal.value, share=self.share, usable=usable, why=why)
 
 
 class _Batch(NamedTuple):

@@ -43,11 +43,6 @@ class Signal(Enum):
     PRESSURE = "actuator_pressure"
     POSITION = "stem_state"
 
-    @classmethod
-    def of(cls, kind: int) -> "Signal":
-        """Return the signal of an arrival by its kind."""
-        return cls.PRESSURE if kind == Kind.PRESSURE else cls.POSITION
-
 
 class SampleFault(Enum):
     """Why a sample is rejected."""
@@ -274,7 +269,7 @@ class RecordBuffer:
         rejected: Counter[tuple[Signal, SampleFault]] = Counter()
         cleared: Statement | None = None
         for kind, stamp, value in zip(*(part.tolist() for part in arrivals), strict=True):
-            signal = Signal.of(kind)
+            signal = Signal.PRESSURE if kind == Kind.PRESSURE else Signal.POSITION
             fault, cause = self._add(signal, stamp, None if kind == Kind.NO_POSITION else value)
             if fault is not None:
                 rejected[signal, fault] += 1
