@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The full check of the accuracy requirements of an identification: `make accuracy`."""
+"""Measurements of accuracy, cost and endurance, started by targets of the Makefile."""
 
 import os
 

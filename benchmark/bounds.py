@@ -7,18 +7,30 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Accuracy requirements of an identification, checked on the outcomes."""
 
-from collections.abc import Callable, Sequence
+"""Requirements of the accuracy benchmark, and the tables of what it reached."""
+
+import statistics
+from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
 import numpy as np
+from rich.table import Table
 
-from benchmark.cases import EXCITATIONS, NOISES, PERIOD, Case
+from benchmark.cases import (
+    NOISES,
+    PERIOD,
+    SETTINGS,
+    Case,
+    Information,
+    Outcome,
+    clean_record,
+    wrong_claims,
+)
 from benchmark.harness.rows import Bound
-from benchmark.runs import SETTINGS, Outcome, wrong_claims
 from valve_friction_ros.health import Baseline, FrictionLimits, diagnose
 from valve_friction_ros.identification import (
     IdentificationSettings,
@@ -35,7 +47,6 @@ from valve_friction_ros.model import (
     Recording,
     SensorNoise,
     Valve,
-    converter_response,
     simulate,
 )
 
@@ -79,44 +90,17 @@ _BASELINE_SEED = 1_000_000
 
 
 @dataclass(frozen=True)
-class Diagnosed:
-    """The diagnosis of one identification.
-
-    Attributes
-    ----------
-    side : str
-        "high" or "low" for an alarm, else empty.
-    ratio : float
-        Friction over the baseline; nan if no friction was identified.
-    """
-
-    side: str
-    ratio: float
-
-
-@dataclass(frozen=True)
 class AlarmCounts:
-    """Alarms and ratios of the two valves.
+    """Alarms and ratios of the two valves."""
 
-    Attributes
-    ----------
-    unchanged : list of str
-        Alarm of each identification of the unchanged valve.
-    declared : list of bool
-        Whether growth was declared, for each pair of identifications.
-    ratios : tuple of list of float
-        Friction over the baseline, for each valve.
-    """
-
-    unchanged: list[str]
-    declared: list[bool]
-    ratios: tuple[list[float], list[float]]
+    unchanged: list[str]  # alarm of each identification of the unchanged valve
+    declared: list[bool]  # whether growth was declared, for each pair of identifications
+    ratios: tuple[list[float], list[float]]  # friction over the baseline, for each valve
 
 
 @cache
 def _clean(growth: float) -> Recording:
-    command, duration = EXCITATIONS["square"]
-    pressure = converter_response(command(np.arange(round(duration / PERIOD)) * PERIOD), PERIOD)
+    pressure = clean_record("low", "square").pressure
     friction = growth * LOW_FRICTION.coulomb_friction
     valve = replace(LOW_FRICTION, coulomb_friction=friction, static_friction=friction)
     return Recording(PERIOD, pressure, simulate(BENCH_VALVE, valve, pressure, PERIOD).position)
@@ -133,19 +117,22 @@ def _baseline() -> Baseline:
     return Baseline.of(_identified(1.0, _BASELINE_SEED))
 
 
-def diagnosed(growth: float, seed: int) -> Diagnosed:
-    """Identify a valve with grown friction, and compare it with the unchanged valve."""
-    try:
-        result = _identified(growth, seed)
-    except RefusalError:
-        return Diagnosed("", float("nan"))
+def diagnosed(growth: float, seed: int) -> tuple[str, float]:
+    """Identify a valve with grown friction, and compare it with the unchanged valve.
+
+    Return "high" or "low" for an alarm, else an empty text, and the friction over the baseline; nan
+    if no friction was identified.
+    """
     limits = FrictionLimits()
-    ratio = diagnose(result, BENCH_VALVE, _baseline(), limits).ratio
+    try:
+        ratio = diagnose(_identified(growth, seed), BENCH_VALVE, _baseline(), limits).ratio
+    except RefusalError:
+        ratio = None
     if ratio is None:
-        return Diagnosed("", float("nan"))
+        return "", float("nan")
     if ratio.low >= limits.warn_ratio:
-        return Diagnosed("high", ratio.value)
-    return Diagnosed("low" if ratio.high <= limits.low_ratio else "", ratio.value)
+        return "high", ratio.value
+    return "low" if ratio.high <= limits.low_ratio else "", ratio.value
 
 
 COVERAGE = (0.90, 0.99)
@@ -252,17 +239,10 @@ def _mass(outcomes: Sequence[Outcome]) -> list[Bound]:
     return [Bound(f"{_title(outcomes[0].case)}: mass refused", f"shown {shown}×", not shown)]
 
 
-_CHECKS: tuple[Callable[[Sequence[Outcome]], list[Bound]], ...] = (
-    _square_bounds,
-    _force_bound,
-    _claims,
-    _mass,
-)
-
-
 def case_bounds(outcomes: Sequence[Outcome]) -> list[Bound]:
     """Check every bound that applies to the outcomes of one case."""
-    return [bound for check in _CHECKS for bound in check(outcomes)]
+    checks = (_square_bounds, _force_bound, _claims, _mass)
+    return [bound for check in checks for bound in check(outcomes)]
 
 
 def default_bounds(outcomes: Sequence[Outcome]) -> list[Bound]:
@@ -300,3 +280,58 @@ def alarm_bounds(counts: AlarmCounts) -> list[Bound]:
     met = declared >= _LEAST_DECLARED * pairs
     bounds.append(Bound(what, f"{declared} of {pairs}", met))
     return bounds
+
+
+_SHOWN = ("coulomb_friction", "viscous_friction", "spring_constant", "static_friction")
+_LETTERS = {"identified": "i", "weak": "w", "not identifiable": "n", "fixed": "f"}
+
+
+def _percent(share: float) -> str:
+    return "–" if np.isnan(share) else f"{100 * share:.2f}"
+
+
+def _verdicts(outcomes: Sequence[Outcome], name: str) -> str:
+    counts = Counter(
+        _LETTERS[outcome.verdicts[name]] for outcome in outcomes if name in outcome.verdicts
+    )
+    return "".join(f"{count}{letter}" for letter, count in sorted(counts.items()))
+
+
+def _row(outcomes: Sequence[Outcome]) -> list[str]:
+    case = outcomes[0].case
+    cells = [case.plant_name, case.excitation, case.noise, case.condition, str(len(outcomes))]
+    cells.append(str(sum(bool(outcome.refusal) for outcome in outcomes) or ""))
+    for name in _SHOWN:
+        covered, answers = coverage_of(outcomes, name)
+        text = f"{_percent(worst(outcomes, name))} {_verdicts(outcomes, name)}"
+        cells.append(text + (f" {100 * covered:.0f}%" if answers > 1 else ""))
+    forces = [outcome.force_error for outcome in outcomes if not np.isnan(outcome.force_error)]
+    cells.append(_percent(max(forces)) if forces else "–")
+    cells.append(f"{statistics.median(outcome.seconds for outcome in outcomes):.1f}")
+    missed = [bound for bound in case_bounds(outcomes) if not bound.met]
+    cells.append(f"[red]{len(missed)} missed[/]" if missed else "[green]met[/]")
+    return cells
+
+
+def cases_table(outcomes: Sequence[Outcome]) -> Table:
+    """Tabulate worst error, verdicts and coverage of each parameter, with a row per case."""
+    columns = ("valve", "excitation", "noise", "rate", "n", "refused", "F_c", "F_v", "k", "F_s")
+    title = "worst error in %, verdicts (i identified, w weak, n not identifiable), coverage"
+    table = Table(*columns, "force %", "s", "bounds", title=title)
+    for group in by_case(outcomes).values():
+        table.add_row(*_row(group))
+    return table
+
+
+def information_table(limits: Sequence[Information]) -> Table:
+    """Tabulate the smallest standard errors that any method can have, in %."""
+    title = "least standard error in %: pressure known exactly … by its samples alone"
+    columns = ("coulomb_friction", "viscous_friction", "spring_constant", "spring_preload")
+    table = Table("valve", "noise", *columns, title=title)
+    for one in limits:
+        cells = [
+            f"{_percent(one.pressure_known[name])} … {_percent(one.pressure_measured[name])}"
+            for name in columns
+        ]
+        table.add_row(one.plant_name, one.noise, *cells)
+    return table

@@ -7,15 +7,24 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Valves and their records: true friction, excitation, noise, sampling and quantisation."""
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+"""Records of the accuracy benchmark, their truth, and one identification of each."""
+
+import math
+import time
+from dataclasses import dataclass, field, replace
 from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
+from valve_friction_ros.identification import (
+    IdentificationSettings,
+    RefusalError,
+    Result,
+    Verdict,
+    identify,
+)
 from valve_friction_ros.model import (
     BENCH_VALVE,
     GRAPHITE_PACKING,
@@ -27,6 +36,7 @@ from valve_friction_ros.model import (
     SensorNoise,
     SineWave,
     SquareWave,
+    StemState,
     TriangleWave,
     Valve,
     converter_response,
@@ -35,16 +45,10 @@ from valve_friction_ros.model import (
 from valve_friction_ros.model.compiled import compiled
 from valve_friction_ros.model.excitations import pressure_at
 
-Motion = Callable[["Plant", NDArray[np.float64], float], NDArray[np.float64]]
-
 BRISTLE_STIFFNESS = 942.4 / 20e-6
 """σ_0 of the LuGre valve, N/m: the stem creeps 20 µm before breakaway."""
 
 _SUBSTEPS = 100
-
-
-def _karnopp(plant: "Plant", pressure: NDArray[np.float64], period: float) -> NDArray[np.float64]:
-    return simulate(plant.valve, plant.parameters, pressure, period).position
 
 
 def _lugre(plant: "Plant", pressure: NDArray[np.float64], period: float) -> NDArray[np.float64]:
@@ -108,44 +112,28 @@ def _step_lugre(
 
 @dataclass(frozen=True)
 class Plant:
-    """A simulated valve and the truth about it.
+    """A simulated valve, with its true friction, spring and mass."""
 
-    Attributes
-    ----------
-    name : str
-        Short name.
-    valve : Valve
-        Geometry.
-    parameters : KarnoppParameters
-        Its true friction, spring and mass.
-    motion : callable
-        Function of plant, pressure (Pa) and sample period (s) that returns the stem position, m.
-    is_karnopp : bool
-        Whether the friction follows the published model.
-    """
-
-    name: str
     valve: Valve
     parameters: KarnoppParameters
-    motion: Motion = _karnopp
-    is_karnopp: bool = True
+    is_karnopp: bool = True  # whether the friction follows the published model
+    has_bristles: bool = False
 
     def respond(self, pressure: NDArray[np.float64], period: float) -> NDArray[np.float64]:
         """Return the stem position, m, under `pressure`, Pa, sampled every `period`, s."""
-        return self.motion(self, pressure, period)
+        if self.has_bristles:
+            return _lugre(self, pressure, period)
+        return simulate(self.valve, self.parameters, pressure, period).position
 
 
 _FALLING = replace(GRAPHITE_PACKING, stribeck_velocity=3.26e-3)
 
 PLANTS = {
-    plant.name: plant
-    for plant in (
-        Plant("low", BENCH_VALVE, LOW_FRICTION),
-        Plant("high", BENCH_VALVE, HIGH_FRICTION),
-        Plant("graphite", GRAPHITE_VALVE, GRAPHITE_PACKING),
-        Plant("stribeck", GRAPHITE_VALVE, _FALLING, is_karnopp=False),
-        Plant("lugre", GRAPHITE_VALVE, _FALLING, _lugre, is_karnopp=False),
-    )
+    "low": Plant(BENCH_VALVE, LOW_FRICTION),
+    "high": Plant(BENCH_VALVE, HIGH_FRICTION),
+    "graphite": Plant(GRAPHITE_VALVE, GRAPHITE_PACKING),
+    "stribeck": Plant(GRAPHITE_VALVE, _FALLING, is_karnopp=False),
+    "lugre": Plant(GRAPHITE_VALVE, _FALLING, is_karnopp=False, has_bristles=True),
 }
 """Plants by name: the paper's valve in two states, graphite with slip jump, two beyond Karnopp."""
 
@@ -162,35 +150,14 @@ NOISES = {
 """White noise of stem and pressure sensor."""
 
 
-@dataclass(frozen=True)
-class Condition:
-    """Sampling of the sensors: every `stride` ms, with 12 bits or unquantised."""
-
-    name: str
-    stride: int
-    quantised: bool
-
-    def sampled(self, recording: Recording) -> Recording:
-        """Return every `stride`-th sample, quantised over 0–30 mm and 0–250 kPa."""
-        pressure = recording.pressure[:: self.stride]
-        position = recording.position[:: self.stride]
-        if self.quantised:
-            pressure, position = _quantised(pressure, 250e3), _quantised(position, 30e-3)
-        return Recording(self.stride * recording.sample_period, pressure, position)
+CONDITIONS = {"1 kHz": 1, "100 Hz": 10}
+"""Milliseconds from sample to sample; the slow sampling has 12 bits."""
 
 
 def _quantised(values: NDArray[np.float64], span: float) -> NDArray[np.float64]:
     """Round to the codes of a 12-bit converter with the range 0 to `span`."""
     unit = span / 2**12
-    rounded: NDArray[np.float64] = np.round(values / unit) * unit
-    return rounded
-
-
-CONDITIONS = {
-    "1 kHz": Condition("1 kHz", 1, quantised=False),
-    "100 Hz": Condition("100 Hz", 10, quantised=True),
-}
-"""Sampling by name; the slow sampling has 12 bits."""
+    return np.round(values / unit) * unit
 
 
 def _in_service(time: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -242,4 +209,170 @@ class Case:
         noise = NOISES[self.noise]
         seeded = SensorNoise(noise.position, noise.pressure, seed)
         noisy = seeded.applied_to(clean_record(self.plant_name, self.excitation))
-        return CONDITIONS[self.condition].sampled(noisy)
+        stride = CONDITIONS[self.condition]
+        pressure, position = noisy.pressure[::stride], noisy.position[::stride]
+        if stride > 1:
+            pressure, position = _quantised(pressure, 250e3), _quantised(position, 30e-3)
+        return Recording(stride * PERIOD, pressure, position)
+
+
+_FREE = ("coulomb_friction", "viscous_friction", "spring_constant", "spring_preload")
+_SLIP, _START = "static_friction", "start"
+_STEP = 1e-4
+"""Step of the numerical derivatives: relative for a parameter, over the travel for the start."""
+
+_SLOWEST = 1e-5
+"""Speed, m/s, below which the stem is at rest, so that noise of the pressure does not matter."""
+
+
+@dataclass(frozen=True)
+class Information:
+    """Smallest standard errors of a Karnopp valve on the square wave (Cramér and Rao)."""
+
+    # valve and sensor noise
+    plant_name: str
+    noise: str
+    pressure_known: dict[str, float]  # relative standard errors if the pressure is known exactly
+    # relative standard errors if the pressure is known only from its noisy samples
+    pressure_measured: dict[str, float]
+
+
+def _stem(
+    plant: Plant, pressure: NDArray[np.float64], start: float, name: str, step: float
+) -> NDArray[np.float64]:
+    """Simulate with one parameter changed by a relative step; F_s − F_c stays constant."""
+    parameters = plant.parameters
+    if name == _START:
+        start += step * plant.valve.travel
+    else:
+        changes = {name: (1 + step) * getattr(parameters, name)}
+        if name == "coulomb_friction":
+            slip = parameters.static_friction - parameters.coulomb_friction
+            changes["static_friction"] = changes[name] + slip
+        parameters = replace(parameters, **changes)
+    return simulate(plant.valve, parameters, pressure, PERIOD, StemState(start, 0.0)).position
+
+
+def information(plant_name: str, noise: str) -> Information:
+    """Compute the Cramér–Rao bound of a Karnopp valve on the square wave at 1 kHz.
+
+    The Fisher information is SᵀW⁻¹S with the sensitivities S of the true model's stem. White noise
+    of the stem sensor alone gives W = σ_x². Noise of the pressure sensor moves the predicted stem
+    of a sliding valve by the factor S_a/k (the valve's own lag is negligible at the slow rates of
+    the sensitivities). This adds (σ_P·S_a/k)² wherever the stem slides. A method that knows the
+    pressure to be smooth, for example behind a lag, may lie between the two.
+    """
+    plant, sensors = PLANTS[plant_name], NOISES[noise]
+    recording, parameters = clean_record(plant_name, "square"), plant.parameters
+    pressure, start = recording.pressure, float(recording.position[0])
+    names = (*_FREE, _START)
+    if parameters.static_friction > parameters.coulomb_friction:
+        names = (*names, _SLIP)
+    higher, lower = (
+        np.column_stack([_stem(plant, pressure, start, name, step) for name in names])
+        for step in (_STEP, -_STEP)
+    )
+    sensitivity = (higher - lower) / (2 * _STEP)
+    slides = np.abs(np.gradient(recording.position, PERIOD)) > _SLOWEST
+    stem = np.full(pressure.size, sensors.position**2)
+    lever = plant.valve.diaphragm_area / parameters.spring_constant
+    both = stem + np.where(slides, (sensors.pressure * lever) ** 2, 0.0)
+
+    def errors(variance: NDArray[np.float64]) -> dict[str, float]:
+        covariance = np.linalg.inv(sensitivity.T @ (sensitivity / variance[:, None]))
+        scatter = np.sqrt(np.diag(covariance)).tolist()
+        return {name: error for name, error in zip(names, scatter, strict=True) if name in _FREE}
+
+    return Information(plant_name, noise, errors(stem), errors(both))
+
+
+SETTINGS = IdentificationSettings(assumed_mass=1.6)
+"""Settings from the configuration of the bench valves."""
+
+TRUE_NAMES = (
+    "coulomb_friction",
+    "viscous_friction",
+    "static_friction",
+    "spring_constant",
+    "spring_preload",
+    "stribeck_velocity",
+)
+"""Parameters to compare with the truth."""
+
+_MOVING = 0.01
+_LARGEST_CLAIM = 0.05
+_LARGEST_INTERVALS = 3.0
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """The outcome of one record."""
+
+    case: Case  # the combination that was run
+    seed: int  # seed of the noise
+    seconds: float  # time of the identification, s
+    refusal: str = ""  # reason of a refusal; else empty
+    # errors and half widths relative to the true value, by parameter; nan without a value
+    errors: dict[str, float] = field(default_factory=dict)
+    half_widths: dict[str, float] = field(default_factory=dict)
+    verdicts: dict[str, str] = field(default_factory=dict)  # verdicts by parameter
+    # worst relative error of the friction force over the speeds of the record
+    force_error: float = math.nan
+    # systematic misfit and its tolerated size, m
+    misfit: float = math.nan
+    tolerated: float = math.nan
+
+
+@cache
+def run_speeds(plant_name: str, excitation: str) -> NDArray[np.float64]:
+    """Return speeds, m/s, from the 5th to the 95th percentile of the speeds of the moving stem."""
+    position = clean_record(plant_name, excitation).position
+    speed = np.abs(np.diff(position)) / PERIOD
+    lowest, highest = np.quantile(speed[speed > _MOVING * speed.max()], (0.05, 0.95))
+    return np.linspace(lowest, highest, 50)
+
+
+def force_error(case: Case, result: Result) -> float:
+    """Return the worst relative error of the friction force in both directions."""
+    speeds = run_speeds(case.plant_name, case.excitation)
+    velocities = np.concatenate([-speeds, speeds])
+    truth = case.plant.parameters.sliding_friction(velocities)
+    found = result.model.sliding_friction(velocities)
+    return float(np.max(np.abs(found / truth - 1)))
+
+
+def run(case: Case, seed: int, method: str = "bench") -> Outcome:
+    """Identify one record, and compare the result with the truth."""
+    recording = case.record(seed)
+    begin = time.perf_counter()
+    try:
+        result = identify(recording, case.plant.valve, SETTINGS, method)
+    except RefusalError as refusal:
+        return Outcome(case, seed, time.perf_counter() - begin, str(refusal))
+    seconds = time.perf_counter() - begin
+    truth = vars(PLANTS[case.plant_name].parameters)
+    known = [name for name in TRUE_NAMES if name in result.parameters and truth[name]]
+    parameters = result.parameters
+    misfit = result.misfit
+    return Outcome(
+        case,
+        seed,
+        seconds,
+        "",
+        {name: parameters[name].value / truth[name] - 1 for name in known},
+        {name: parameters[name].half_width / abs(truth[name]) for name in known},
+        {name: one.verdict.value for name, one in parameters.items()},
+        force_error(case, result),
+        math.nan if misfit is None else misfit.systematic,
+        math.nan if misfit is None else misfit.tolerated,
+    )
+
+
+def wrong_claims(outcome: Outcome) -> list[str]:
+    """Return identified parameters with errors above 5 % or three half widths."""
+    wrong = []
+    for name, error in outcome.errors.items():
+        allowed = min(_LARGEST_CLAIM, _LARGEST_INTERVALS * outcome.half_widths[name])
+        if outcome.verdicts[name] == Verdict.IDENTIFIED.value and not abs(error) <= allowed:
+            wrong.append(name)
+    return wrong

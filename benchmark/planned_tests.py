@@ -22,11 +22,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from benchmark.reality.package import identify
-from benchmark.reality.plants import Body, Friction, Law, Plant, Trend, move
-from benchmark.reality.plants.kernel import GRID, Loop
-from benchmark.reality.records import Nominal, Record
+from benchmark.reality.plants import GRID, Body, Friction, Law, Plant, Trend, move, open_loop
+from benchmark.reality.records import Nominal, Record, truth_of
 from benchmark.reality.sensors import Instruments, Stamping, measured
-from benchmark.reality.truth import truth_of
 from valve_friction_ros.identification import IdentificationSettings, RefusalError
 from valve_friction_ros.model import Excitation, SquareWave, Valve
 from valve_friction_ros.planning import Conditions, Limits, StrokePlan, known_friction, plan_test
@@ -52,31 +50,18 @@ _LAWS: Mapping[str, Mapping[str, object]] = {
 
 @dataclass(frozen=True)
 class Trial:
-    """One valve with its planned test and its identification.
+    """One valve with its planned test and its identification."""
 
-    Attributes
-    ----------
-    law : str
-        Name of its friction law.
-    wrong : float
-        Assumed friction over the true friction.
-    predicted, reported, square, errors : mapping of str to float
-        Half widths predicted, reported, and reported for the square wave, and actual errors, as
-        shares of the true values, by the name of the number.
-    refusal : str
-        Why there is no plan or no result; empty otherwise.
-    reach : tuple of float
-        Lowest and highest position, shares of the travel.
-    """
-
-    law: str
-    wrong: float
+    law: str  # name of its friction law
+    wrong: float  # assumed friction over the true friction
+    # half widths predicted, reported, and reported for the square wave, and actual errors, as
+    # shares of the true values, by the name of the number
     predicted: Mapping[str, float] = field(default_factory=dict)
     reported: Mapping[str, float] = field(default_factory=dict)
     square: Mapping[str, float] = field(default_factory=dict)
     errors: Mapping[str, float] = field(default_factory=dict)
-    refusal: str = ""
-    reach: tuple[float, float] = (0.0, 0.0)
+    refusal: str = ""  # why there is no plan or no result; empty otherwise
+    reach: tuple[float, float] = (0.0, 0.0)  # lowest and highest position, shares of the travel
 
 
 def _plant(law: str, random: np.random.Generator) -> Plant:
@@ -91,11 +76,10 @@ def _record(
     plant: Plant, excitation: Excitation, duration: float, seed: int
 ) -> tuple[Record, tuple[float, float]]:
     """Drive a valve with a signal, and measure it."""
-    lag = _CONDITIONS.converter_lag
-    loop = Loop(False, False, 0.0, 1.0, 1000, 1.0, _BOTTOM, _SPAN, lag)
+    loop = open_loop(_BOTTOM, _SPAN, _CONDITIONS.converter_lag)
     time = np.arange(round(duration / GRID) + 1) * GRID
     signal = (excitation.sample(time) - _BOTTOM) / _SPAN
-    motion = move(plant, loop, signal, np.zeros(time.size // 1000 + 1), 0.0)
+    motion = move(plant, loop, signal, np.zeros(time.size // loop.every + 1), 0.0)
     stamping = Stamping(rate=_RATE)
     instruments = Instruments(pressure_stamping=stamping, position_stamping=stamping)
     pressure, position = measured(motion, instruments, duration, seed)

@@ -20,9 +20,17 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmark.reality.plants import Body, Friction, Plant
-from benchmark.reality.plants.laws import INNER, V, X, moreau
-from benchmark.reality.plants.parameters import Constants, constants
+from benchmark.reality.plants import (
+    INNER,
+    Body,
+    Constants,
+    Friction,
+    Plant,
+    V,
+    X,
+    constants,
+    moreau,
+)
 
 STEP = 1e-4
 FAULTS = ("healthy", "sticky", "late", "slow", "setting")
@@ -33,32 +41,19 @@ _SPAN = _BODY.spring * _BODY.travel / _BODY.area
 
 
 class Positioner(NamedTuple):
-    """A proportional (pressure per error) or integrating (flow per error) positioner.
+    """A proportional (pressure per error) or integrating (flow per error) positioner."""
 
-    Attributes
-    ----------
-    gain : float
-        Pressure change, in spans, per error, in travels; per second for an integrating positioner.
-    integral : float
-        Integral rate per error of a proportional positioner, 1/s; 0 for no integral action.
-    rate : float
-        Largest rate of the pressure, spans per second.
-    lag, delay, offset : float
-        Lag of the amplifier, s; delay, s; calibration error, share of the travel.
-    integrates : bool
-        Whether flow, not pressure, is proportional to the error.
-    dead_zone : float
-        Error, share of the travel, without effect.
-    """
-
+    # pressure change, in spans, per error, in travels; per second for an integrating positioner
     gain: float
+    # integral rate per error of a proportional positioner, 1/s; 0 for no integral action
     integral: float
-    rate: float
+    rate: float  # largest rate of the pressure, spans per second
+    # lag of the amplifier, s; delay, s; calibration error, share of the travel
     lag: float
     delay: float
     offset: float
-    integrates: bool
-    dead_zone: float
+    integrates: bool  # whether flow, not pressure, is proportional to the error
+    dead_zone: float  # error, share of the travel, without effect
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from hypothesis import settings
-from postgres import database, postgres  # noqa: F401 - fixtures
+from local_server import database, postgres  # noqa: F401 - fixtures
 from processes import MARK, orphans
 from records import sine_record
 

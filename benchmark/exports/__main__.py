@@ -7,7 +7,10 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Draw, write and read the exports; print the outcome of each."""
+"""Exports of other programs with known truth, to test whether they are read, and read correctly.
+
+`python -m benchmark.exports` draws the valves, writes the files, reads them and prints a table.
+"""
 
 import argparse
 import tempfile
@@ -18,8 +21,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmark.exports.programs import PROGRAMS
-from benchmark.exports.trial import read
-from benchmark.exports.truth import draw
+from benchmark.exports.truth import draw, read
 
 
 def main() -> None:

@@ -15,7 +15,7 @@ Conventions and rounding follow the exports of the real programs.
 import csv
 import io
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from datetime import datetime, timedelta, timezone
 from typing import Any
 from zoneinfo import ZoneInfo
@@ -23,44 +23,17 @@ from zoneinfo import ZoneInfo
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmark.exports.truth import Truth
+from benchmark.exports.truth import TRANSMITTER, Export, Truth
 
 Random = np.random.Generator
 PRESSURES = {"Pa": 1.0, "kPa": 1e3, "bar": 1e5, "mbar": 1e2, "psi": 6894.757293168}
 LENGTHS = {"mm": 1e-3, "in": 25.4e-3, "cm": 1e-2, "m": 1.0}
-TRANSMITTER = (0.0, 4e5)
-"""Range of the pressure transmitters, Pa."""
-
-
 _ISO = "%Y-%m-%d %H:%M:%S.<f>"
 _PI_WORDS = ("Bad Input", "I/O Timeout", "No Data", "Bad", "Scan Off")
 _EXACT = {"coarse_pressure": 1e-6, "coarse_position": 1e-12}
 """Rounding errors of a file with all digits."""
 
 Texts = Sequence[str]
-
-
-@dataclass(frozen=True)
-class Export:
-    """A file, and the knowledge of the person who reads it.
-
-    Attributes
-    ----------
-    answers : mapping of str to str
-        The true answer to each option, by its name in `Columns`.
-    coarse_pressure, coarse_position, clock : float
-        Largest rounding error, Pa, m and s.
-    exact_date : bool
-        Whether the file contains the date of the record.
-    """
-
-    name: str
-    content: bytes
-    answers: dict[str, object] = field(default_factory=dict)
-    coarse_pressure: float = 1.0
-    coarse_position: float = 1e-6
-    exact_date: bool = True
-    clock: float = 1e-6
 
 
 def _times(truth: Truth, form: str = _ISO, zone: str = "UTC", digits: int = 3) -> list[str]:
@@ -731,12 +704,10 @@ def _scope(truth: Truth, mark: str) -> Export:
 
 
 def twin_cat(truth: Truth, random: Random) -> Export:
-    del random
     return _scope(truth, "\t")
 
 
 def twin_cat_semicolons(truth: Truth, random: Random) -> Export:
-    del random
     return _scope(truth, ";")
 
 

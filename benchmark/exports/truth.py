@@ -7,41 +7,57 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Randomly generated valves and motions, from a simulation that shares no code with the package."""
 
-from dataclasses import dataclass
+"""What an export holds and what its reader knows; exports are read as a person would."""
+
+import re
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+from valve_friction_ros.identification.refusal import RefusalError
+from valve_friction_ros.model import Recording, Valve
+from valve_friction_ros.records.columns import Columns
+from valve_friction_ros.records.recordings import read_table
 
 STEP = 1e-3
 DURATION = 40.0
 """Simulated time step and duration, s."""
 
 
+TRANSMITTER = (0.0, 4e5)
+"""Range of the pressure transmitters, Pa."""
+
+
+@dataclass(frozen=True)
+class Export:
+    """A file, and the knowledge of the person who reads it."""
+
+    name: str
+    content: bytes
+    # the true answer to each option, by its name in `Columns`
+    answers: dict[str, object] = field(default_factory=dict)
+    # largest rounding errors, Pa, m and s
+    coarse_pressure: float = 1.0
+    coarse_position: float = 1e-6
+    exact_date: bool = True  # whether the file contains the date of the record
+    clock: float = 1e-6
+
+
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """A valve and its motion.
+    """A valve and its motion."""
 
-    Attributes
-    ----------
-    area, travel, friction : float
-        m², m, N.
-    time : ndarray of float, shape (n,)
-        s since `start`.
-    pressure, position : ndarray of float, shape (n,)
-        Pa, gauge; m.
-    start : int
-        Time of the first sample, ns since 1970.
-    """
-
-    area: float
-    travel: float
-    friction: float
-    time: NDArray[np.float64]
-    pressure: NDArray[np.float64]
-    position: NDArray[np.float64]
-    start: int
+    area: float  # m²
+    travel: float  # m
+    friction: float  # N
+    time: NDArray[np.float64]  # s since `start`
+    pressure: NDArray[np.float64]  # Pa, gauge
+    position: NDArray[np.float64]  # m
+    start: int  # time of the first sample, ns since 1970
 
     @property
     def stamps(self) -> NDArray[np.int64]:
@@ -86,3 +102,70 @@ def draw(count: int, seed: int) -> list[Truth]:
         sizes = (float(values[one]) for values in (area, travel, friction))
         found.append(Truth(*sizes, *signals, start))
     return found
+
+
+_OPTION = re.compile(r"--([a-z][a-z-]+)")
+
+
+class Outcome(NamedTuple):
+    """Outcome of an export: ``none``, ``options``, ``refused`` or ``wrong``; and the message."""
+
+    kind: str
+    options: int
+    message: str
+
+
+def read(export: Export, truth: Truth, folder: Path) -> Outcome:
+    """Read an export, and compare the recording with the truth."""
+    path = folder / export.name
+    path.write_bytes(export.content)
+    low, high = TRANSMITTER
+    valve = Valve(truth.area, 0.0, truth.travel, low - 2e4, high + 2e4)
+    name = export.answers.get("valve")
+    form = Columns(pressure_range=f"{low / 1e5:g}..{high / 1e5:g} bar")
+    given: dict[str, Any] = {}
+    message = ""
+    for _ in range(2):
+        try:
+            (recorded,) = read_table(
+                path, valve, replace(form, **given), name=str(name) if name else None
+            )
+            recording = recorded.recording()
+        except (ValueError, RefusalError) as error:
+            message = str(error)
+            named = {option.replace("-", "_") for option in _OPTION.findall(message)}
+            told = {key: value for key, value in export.answers.items() if key in named}
+            if not told or given:
+                return Outcome("refused", len(given), message)
+            given = told
+            continue
+        if fault := _fault(export, truth, recording):
+            return Outcome("wrong", len(given), fault)
+        return Outcome("options" if given else "none", len(given), message)
+    return Outcome("refused", len(given), message)
+
+
+def _fault(export: Export, truth: Truth, recording: Recording) -> str:
+    """Return how a recording differs from the truth; empty if it does not."""
+    if recording.stamped is None:
+        drive = (recording.time, recording.drive)
+        stem = (recording.time, recording.position)
+    else:
+        stamped = recording.stamped
+        drive = (stamped.drive.time, stamped.drive.value)
+        stem = (stamped.position.time, stamped.position.value)
+    offset = recording.start_time - truth.start / 1e9 if export.exact_date else 0.0
+    if abs(offset) > 0.5:
+        return f"begins {offset:g} s late"
+    for name, (time, values), true, coarse in (
+        ("pressure", drive, truth.pressure, export.coarse_pressure),
+        ("position", stem, truth.position, export.coarse_position),
+    ):
+        at = np.interp(time + offset, truth.time, true)
+        steep = np.max(np.abs(np.diff(true)) / np.diff(truth.time)) * export.clock
+        worst = float(np.max(np.abs(values - at)))
+        if worst > coarse + steep + 1e-9 * float(np.max(np.abs(true))):
+            return f"{name} is wrong by {worst:g} (allowed {coarse + steep:g})"
+        if time[-1] - time[0] < 0.9 * (truth.time[-1] - truth.time[0]):
+            return f"{name} lasts {time[-1] - time[0]:g} s"
+    return ""

@@ -50,8 +50,7 @@ def free_port(address: str = "127.0.0.1") -> int:
     """Return a free port on this machine."""
     with socket.socket() as tried:
         tried.bind((address, 0))
-        port: int = tried.getsockname()[1]
-        return port
+        return tried.getsockname()[1]
 
 
 def processor_seconds(process: int) -> float:
@@ -84,15 +83,8 @@ class Usage(NamedTuple):
 class Process(contextlib.AbstractContextManager["Process"]):
     """A running program, which ends with its `with` block.
 
-    Parameters
-    ----------
-    command : sequence of str
-        The program and its arguments.
-    log : Path or None
-        File for the output, and for the stacks of all threads if the program hangs. None: read the
-        output here, and keep the input open until the end.
-    environment : mapping of str to str or None
-        Environment variables; None for those of this process.
+    Its output, and the stacks of all threads if it hangs, go to the file `log`. Without a log, its
+    output is read here, and its input stays open until the end.
     """
 
     def __init__(

@@ -7,67 +7,61 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Measured items with their peers and goals, as rows, tables and JSON."""
+"""What all benchmarks share: rows and bounds with their goals, tables, JSON, parallel work."""
 
+import argparse
 import datetime
 import json
+import multiprocessing
 import os
 import platform
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from rich.console import Console
+from rich.progress import track
 from rich.table import Table
 
-_WIDTH_OF_A_FILE = 120
+_WIDTH_OF_A_FILE = 150
+_MARKS = {None: "", True: "[green]met[/]", False: "[red]missed[/]"}
 
 
 @dataclass(frozen=True)
 class Row:
-    """One item of a part.
-
-    Attributes
-    ----------
-    item : str
-        Measured quantity.
-    ours : float
-        Value for the package.
-    unit : str
-        Unit of `ours` and `peer`.
-    peer : float or None
-        Value for the peer, if there is one.
-    peer_name : str
-        Name of the peer.
-    goal : str
-        Goal in words; empty if the item is for comparison only.
-    met : bool or None
-        Whether the goal was met; None without a goal.
-    """
+    """A measured item of a part, beside its peer and its goal; `ours` and `peer` have one unit."""
 
     item: str
     ours: float
     unit: str = ""
     peer: float | None = None
     peer_name: str = ""
-    goal: str = ""
-    met: bool | None = None
+    goal: str = ""  # empty if the item is for comparison only
+    met: bool | None = None  # None without a goal
 
     @property
     def ratio(self) -> float | None:
         """Peer over ours: for a cost, the factor by which ours is cheaper."""
         return None if self.peer is None or self.ours == 0 else self.peer / self.ours
 
+    def __str__(self) -> str:
+        return f"{self.item}: {self.goal}"
+
 
 @dataclass(frozen=True)
 class Bound:
     """A requirement, the figure reached, and whether it is met."""
 
-    what: str  # the requirement
-    reached: str  # the figure reached
-    met: bool  # whether it is met
+    what: str
+    reached: str
+    met: bool
+
+    def __str__(self) -> str:
+        return f"{self.what}: {self.reached}"
 
 
 def none(item: str, count: int) -> Row:
@@ -92,6 +86,14 @@ def under(item: str, value: float, unit: str, limit: float, *peer: float | str) 
     return Row(item, value, unit, *told, f"under {limit:g} {unit}".rstrip(), value < limit)
 
 
+def new_file(text: str) -> Path:
+    """Return the path of a file to write, for an option; its folder must exist."""
+    path = Path(text)
+    if not path.parent.is_dir():
+        raise argparse.ArgumentTypeError(f"{path}: there is no folder {path.parent}")
+    return path
+
+
 def machine_shape() -> dict[str, str | float]:
     """Return the properties of machine, load and software that affect the numbers."""
     return {
@@ -110,6 +112,29 @@ def opened_console() -> Console:
     return console
 
 
+def in_parallel(
+    title: str,
+    work: Callable[..., Any],
+    tasks: Iterable[tuple[Any, ...]],
+    jobs: int,
+    arrived: Callable[[Any], object] = lambda _: None,
+) -> list[Any]:
+    """Return the results of all tasks in order, from `jobs` processes, with a progress bar.
+
+    `arrived` sees each result as soon as it is there.
+    """
+    with ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn")) as pool:
+        pending = [pool.submit(work, *task) for task in tasks]
+        bar = Console(stderr=True)
+        try:
+            for one in track(as_completed(pending), title, len(pending), console=bar):
+                arrived(one.result())
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+    return [one.result() for one in pending]
+
+
 def logged(rows: Iterable[Row], found: list[Row], console: Console) -> None:
     """Append rows to `found`, and print each as it arrives."""
     for row in rows:
@@ -117,12 +142,12 @@ def logged(rows: Iterable[Row], found: list[Row], console: Console) -> None:
         console.log(f"{row.item}: {row.ours:.3g} {row.unit}")
 
 
-def judged(rows: Iterable[Row], console: Console) -> int:
+def judged(found: Iterable[Row | Bound], console: Console) -> int:
     """Print the missed goals; return 1 if there are any, else 0."""
-    goals = [row for row in rows if row.met is not None]
-    missed = [row for row in goals if not row.met]
-    for row in missed:
-        console.print(f"[red]missed[/] {row.item}: {row.goal}", soft_wrap=True)
+    goals = [one for one in found if one.met is not None]
+    missed = [one for one in goals if not one.met]
+    for one in missed:
+        console.print(f"[red]missed[/] {one}", soft_wrap=True)
     console.print(f"{len(goals) - len(missed)} of {len(goals)} goals are met")
     return 1 if missed else 0
 
@@ -137,12 +162,19 @@ def rows_table(title: str, rows: Sequence[Row]) -> Table:
     for column in ("item", "ours", "peer", "ratio", "goal", ""):
         right = column in ("ours", "peer", "ratio")
         table.add_column(column, justify="right" if right else "left")
-    marks = {None: "", True: "[green]met[/]", False: "[red]missed[/]"}
     for row in rows:
         ours = f"{_number(row.ours)} {row.unit}"
         peer = "" if row.peer is None else f"{_number(row.peer)} {row.unit}\n{row.peer_name}"
         ratio = "" if row.ratio is None else f"{_number(row.ratio)}×"
-        table.add_row(row.item, ours, peer, ratio, row.goal, marks[row.met])
+        table.add_row(row.item, ours, peer, ratio, row.goal, _MARKS[row.met])
+    return table
+
+
+def bounds_table(bounds: Iterable[Bound]) -> Table:
+    """Tabulate requirements."""
+    table = Table("requirement", "reached", "", title="requirements")
+    for bound in bounds:
+        table.add_row(bound.what, bound.reached, _MARKS[bound.met])
     return table
 
 

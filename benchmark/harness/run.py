@@ -27,6 +27,7 @@ from rclpy.executors import SingleThreadedExecutor
 from benchmark.harness.rows import Row, judged, opened_console, rows_table
 from valve_friction_ros.commands.demo.bench import free_domain
 
+BENCH = Path(__file__).resolve().parents[2] / "config" / "bench_low.yaml"
 Events = Sequence[Mapping[str, Any]]
 
 
@@ -116,14 +117,7 @@ def endured(
 class Participant(contextlib.AbstractContextManager["Participant"]):
     """A node that hears others while it spins, and leaves at the end of its `with` block.
 
-    Parameters
-    ----------
-    name : str
-        Name of the node.
-    domain : int or None
-        ROS domain; None for that of the environment.
-    options
-        Further options of a node.
+    `domain` is its ROS domain; None for that of the environment. The options are those of a node.
     """
 
     def __init__(self, name: str, domain: int | None = None, **options: Any) -> None:

@@ -7,20 +7,23 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Run the benchmark: python -m benchmark.reality, or `make reality`."""
+"""Realistic valves and sensors, to test an identification: `make reality`.
+
+The benchmark shares no code with the package under test: its plants are written independently, with
+finer steps than the package's simulator. Only the module `package` calls it.
+"""
 
 import argparse
-import multiprocessing
 import os
 import secrets
 import sys
-from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import chain
 from pathlib import Path
 
 from rich.console import Console
-from rich.progress import track
 
+from benchmark.harness.rows import in_parallel, new_file
 from benchmark.reality.motions import Kind
 from benchmark.reality.records import Case
 from benchmark.reality.report import bounds, report
@@ -53,7 +56,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--real", type=Path, metavar="FOLDER", help="holds the folders cylinders and emps"
     )
-    parser.add_argument("--out", type=Path, default=Path("reality.jsonl"), help="the rows")
+    parser.add_argument("--out", type=new_file, default=Path("reality.jsonl"), help="the rows")
     parser.add_argument("--read", action="store_true", help="show the rows of --out; run nothing")
     return parser
 
@@ -63,16 +66,12 @@ def _tasks(options: argparse.Namespace, entropy: int) -> Iterator[Task]:
     motions = [Kind(motion) for motion in options.motions]
     for place, part in enumerate(_PARTS):
         some = {"plain": motions, "stickslip": _SLIPPING, "alarms": _WATCHED}[part]
+        special = {"plain": {}, "stickslip": {"slips": True}, "alarms": {"reserve": _RESERVE}}[part]
         for number in range(options.records or counts[part]):
             for motion in motions:
-                if part not in options.only or motion not in some:
-                    continue
-                case = Case(entropy + place, motion, number)
-                if part == "stickslip":
-                    case = case._replace(slips=True)
-                if part == "alarms":
-                    case = case._replace(reserve=_RESERVE)
-                yield Task(part, case, options.limit, options.save)
+                if part in options.only and motion in some:
+                    case = Case(entropy + place, motion, number, **special)
+                    yield Task(part, case, options.limit, options.save)
 
 
 def _run(options: argparse.Namespace, console: Console) -> list[Row]:
@@ -81,27 +80,19 @@ def _run(options: argparse.Namespace, console: Console) -> list[Row]:
     console.print(f"--entropy {entropy}")
     if options.save is not None:
         options.save.mkdir(parents=True, exist_ok=True)
-    rows: list[Row] = []
-    context = multiprocessing.get_context("spawn")
-    with (
-        options.out.open("w", encoding="utf-8") as file,
-        ProcessPoolExecutor(options.jobs, context) as pool,
-    ):
-        answers = [pool.submit(tried, task) for task in _tasks(options, entropy)]
-        console = Console(stderr=True)
-        for one in track(as_completed(answers), "reality", len(answers), console=console):
-            rows += one.result()
-            file.writelines(row.as_line() + "\n" for row in one.result())
+    with options.out.open("w", encoding="utf-8") as file:
+
+        def write(rows: Iterable[Row]) -> None:
+            file.writelines(row.as_line() + "\n" for row in rows)
             file.flush()
-    return rows
+
+        tasks = ((task,) for task in _tasks(options, entropy))
+        return list(chain.from_iterable(in_parallel("reality", tried, tasks, options.jobs, write)))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the requested parts; return 1 if a bound is missed."""
-    parser = _parser()
-    options = parser.parse_args(arguments)
-    if not options.out.parent.is_dir():
-        parser.error(f"{options.out}: there is no folder {options.out.parent}")
+    options = _parser().parse_args(arguments)
     console = Console(soft_wrap=True, highlight=False, markup=False)
     rows = rows_of(options.out) if options.read else _run(options, console)
     motions = [kind.value for kind in Kind]

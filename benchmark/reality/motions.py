@@ -15,7 +15,7 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmark.reality.plants.kernel import GRID, Loop
+from benchmark.reality.plants import GRID, Loop, open_loop
 from benchmark.reality.valves import DrawnValve, log_uniform
 
 
@@ -36,23 +36,12 @@ class Kind(Enum):
 
 @dataclass(frozen=True, eq=False)
 class Drive:
-    """Arguments of `plants.move`.
+    """Arguments of `plants.move`."""
 
-    Attributes
-    ----------
-    loop : Loop
-        Converter and controller.
-    signal : ndarray of float, shape (n,)
-        Command or set point on the grid.
-    disturbance : ndarray of float, shape (m,)
-        Measurement noise of the controller.
-    before, duration : float
-        Time from the first point to the start of the record, and length of the record, s.
-    """
-
-    loop: Loop
-    signal: NDArray[np.float64]
-    disturbance: NDArray[np.float64]
+    loop: Loop  # converter and controller
+    signal: NDArray[np.float64]  # command or set point on the grid; shape (n,)
+    disturbance: NDArray[np.float64]  # measurement noise of the controller; shape (m,)
+    # time from the first point to the start of the record, and length of the record, s
     before: float
     duration: float
 
@@ -66,23 +55,12 @@ _CONTROLLED = 2e-4
 
 def _time(before: float, duration: float) -> _Signal:
     count = round((before + duration) / GRID) + 1
-    time: _Signal = GRID * np.arange(count, dtype=np.float64) - before
-    return time
+    return GRID * np.arange(count, dtype=np.float64) - before
 
 
 def _open(valve: DrawnValve, signal: _Signal, before: float, duration: float) -> Drive:
-    loop = Loop(
-        closed=False,
-        flow=False,
-        gain=0.0,
-        integral_time=1.0,
-        every=1000,
-        process_lag=1.0,
-        bottom=valve.low,
-        span=valve.high - valve.low,
-        converter_lag=valve.filling,
-    )
-    return Drive(loop, signal, np.zeros(signal.size // 1000 + 1), before, duration)
+    loop = open_loop(valve.low, valve.high - valve.low, valve.filling)
+    return Drive(loop, signal, np.zeros(signal.size // loop.every + 1), before, duration)
 
 
 def _closed(

@@ -17,7 +17,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 from unittest.mock import patch
 
 import numpy as np
@@ -73,19 +73,6 @@ class Answer:
     native: Result | None = None
     fits: Sequence[PosteriorFit] = ()
     held: Mapping[str, Measured] = field(default_factory=dict)
-
-
-class Ends(NamedTuple):
-    """Result of the search, compared with a fit that starts at the truth.
-
-    `found` and `begun` are the sums of squares of search and fit, in variances of the residual of
-    the fit. `coulomb` is F_c of the search, N; `half_widths` are those of the fit.
-    """
-
-    found: float
-    begun: float
-    coulomb: float
-    half_widths: Mapping[str, float]
 
 
 def _valve(nominal: Nominal) -> Valve:
@@ -207,10 +194,14 @@ def _words(one: Any) -> str:
     return f"{one.level.name} {one.status_signal.value}: {one.message}"
 
 
-def ends(record: Record, answer: Answer) -> Ends | None:
-    """Compare the search with a fit that starts at the truth; return None without a simulation."""
+def ends(record: Record, answer: Answer) -> dict[str, Any]:
+    """Compare the search with a fit that starts at the truth; empty without a simulation.
+
+    `found` and `begun` are the sums of squares of search and fit, in variances of the residual of
+    the fit. `coulomb` is F_c of the search, N; `widths` are the half widths of the fit.
+    """
     if not answer.fits:
-        return None
+        return {}
     found, truth = answer.fits[0], record.truth
     at = {name: truth[name].value for name in _PLAIN}
     at |= {**record.late, "start_position": record.start}
@@ -222,6 +213,10 @@ def ends(record: Record, answer: Answer) -> Ends | None:
         names = (*(name for name in names if name != "at_low_speed"), "stribeck_velocity")
     begun = engine_at.fit({**engine_at.base, **at}, names, _STEPS, engine_at.exact)
     widths = {name: one.half_width for name, one in estimated([begun]).items()}
-    coulomb = estimated(answer.fits)["coulomb_friction"].value
     scale = begun.inflation
-    return Ends(found.objective / scale, begun.objective / scale, coulomb, widths)
+    return {
+        "found": found.objective / scale,
+        "begun": begun.objective / scale,
+        "coulomb": estimated(answer.fits)["coulomb_friction"].value,
+        "widths": widths,
+    }

@@ -7,26 +7,149 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Records of random valves under random drives, with the measured signals and the truth."""
+
+"""Records of random valves, and the truth about them."""
 
 import json
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmark.reality.imperfections import Draft, drawn_imperfections
 from benchmark.reality.motions import Drive, Kind, drawn_drive
-from benchmark.reality.plants import Motion, move
-from benchmark.reality.plants.kernel import GRID
-from benchmark.reality.sensors import Signal, measured
-from benchmark.reality.truth import TrueValue, truth_of
-from benchmark.reality.valves import drawn_cylinder, drawn_valve
+from benchmark.reality.plants import GRID, Body, Law, Motion, Plant, Trend, move
+from benchmark.reality.sensors import Instruments, Signal, measured
+from benchmark.reality.valves import Draft, drawn_cylinder, drawn_imperfections, drawn_valve
+
+
+@dataclass(frozen=True)
+class TrueValue:
+    """A number, and the ambiguity of its definition."""
+
+    value: float  # the number, SI unit
+    # largest distance to another sensible definition: friction that changes along the travel has
+    # different means over distance and over time
+    spread: float = 0.0
+
+    def error(self, estimate: float) -> float:
+        """Return the distance of an estimate from all definitions, SI unit, ≥ 0."""
+        return max(abs(estimate - self.value) - self.spread, 0.0)
+
+
+def _among(value: float, others: Iterable[float]) -> TrueValue:
+    return TrueValue(value, max((abs(other - value) for other in others), default=0.0))
+
+
+def _factor(trend: Trend, place: float) -> float:
+    middle = place - 0.5
+    return 1.0 + trend.change * (middle + trend.bend * (2.0 * middle**2 - 1.0 / 6.0))
+
+
+def _load(body: Body, position: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the forces of spring and medium, N, referred to the nominal area."""
+    place = position / body.travel
+    spring = body.spring * position * (1.0 + 0.5 * body.spring_curve * (place - 1.0))
+    flow = body.flow_force * np.maximum(place, 0.0) ** body.flow_exponent
+    area = 1.0 + body.area_change * (place - 0.5)
+    return (body.preload + spring + flow) / area
+
+
+def _springs(
+    body: Body, position: NDArray[np.float64], drifts: Iterable[float]
+) -> tuple[TrueValue, TrueValue]:
+    """Return k and F_0 over the range visited, by time, by the ends, and nominal."""
+    low, high = float(position.min()), float(position.max())
+    places = np.linspace(low, high, 200, dtype=np.float64)
+    fits = [np.polyfit(where, _load(body, where), 1) for where in (places, position[::100])]
+    ends = np.array([low, high])
+    fits.append(np.polyfit(ends, _load(body, ends), 1))
+    slopes, intercepts = (list(map(float, one)) for one in zip(*fits, strict=True))
+    middle, *shifts = drifts
+    preload = intercepts[0] + middle
+    seen = [one + shift for one in (*intercepts[1:], body.preload) for shift in (middle, *shifts)]
+    seen += [intercepts[0] + shift for shift in shifts]
+    return _among(slopes[0], (*slopes[1:], body.spring)), _among(preload, seen)
+
+
+def _frictions(plant: Plant, motion: Motion, middle: float) -> tuple[TrueValue, TrueValue]:
+    """Return F_c and F_s by distance, by time, in the middle, and for the nominal area."""
+    body, friction = plant.body, plant.friction
+    place = middle / body.travel
+    area = 1.0 + body.area_change * (place - 0.5)
+    by_place = friction.coulomb * _factor(friction.along_travel, place)
+    levels = (motion.coulomb_by_distance, motion.coulomb_by_time, by_place)
+    coulomb = _among(levels[0], (*levels[1:], levels[0] / area))
+    ratio = friction.static / friction.coulomb
+    peaks = [ratio * level for level in levels[1:]] + [ratio * levels[0] / area]
+    if friction.law in (Law.LUGRE, Law.MAXWELL):
+        peaks.append(motion.largest)
+    return coulomb, _among(ratio * levels[0], peaks)
+
+
+def _sliding(motion: Motion, recorded: NDArray[np.bool_]) -> TrueValue:
+    """Return the friction work per distance, with and without elastic bending."""
+    position, force = motion.position[recorded], motion.friction[recorded]
+    lost = float(np.sum(0.5 * (force[1:] + force[:-1]) * np.diff(position)))
+    if motion.distance == 0.0:
+        return TrueValue(math.nan)
+    return _among(motion.work / motion.distance, (abs(lost) / motion.distance,))
+
+
+def _offset(plant: Plant, instruments: Instruments) -> TrueValue:
+    """Return the clock offset, with and without lags that have the same effect."""
+    stem, pressure = instruments.position, instruments.pressure
+    clocks = instruments.position_stamping.offset - instruments.pressure_stamping.offset
+    lags = stem.lag - pressure.lag + plant.body.volume_lag
+    held = 0.5 * (stem.hold - pressure.hold)
+    return _among(clocks + lags + held, (clocks, clocks + lags, clocks + held))
+
+
+def truth_of(
+    plant: Plant, motion: Motion, instruments: Instruments, duration: float
+) -> dict[str, TrueValue]:
+    """Return the truth about a record of `duration` seconds, SI units.
+
+    If a number changes in the record or has no single definition, its value is the mean over the
+    distance, and `spread` covers the other definitions. Spring and preload are slope and intercept
+    of all forces along the travel, referred to the nominal area. The clock offset is the apparent
+    delay of the stem, including slow sensors and the actuator volume.
+    """
+    recorded = motion.time >= -1e-9
+    position = motion.position[recorded]
+    middle = 0.5 * float(position.min() + position.max())
+    body, friction = plant.body, plant.friction
+    falls = friction.static > friction.coulomb
+    is_karnopp = friction.law in (Law.KARNOPP, Law.LATCHED)
+    end = body.area * instruments.pressure.drift * duration
+    spring, preload = _springs(body, position, (0.5 * end, 0.0, end))
+    coulomb, static = _frictions(plant, motion, middle)
+    # Friction that is larger upward has the same effect as a larger preload.
+    one_sided = abs(friction.asymmetry) * coulomb.value
+    # If the diaphragm area differs here from the nominal area, all forces scale by that factor.
+    seen = 1.0 / (1.0 + body.area_change * (middle / body.travel - 0.5))
+    sliding = _sliding(motion, recorded)
+    return {
+        "mass": TrueValue(body.mass),
+        "viscous_friction": _among(friction.viscous, (friction.viscous * seen,)),
+        "coulomb_friction": coulomb,
+        "static_friction": static,
+        "spring_constant": spring if body.spring else TrueValue(math.nan),
+        "spring_preload": TrueValue(preload.value, preload.spread + one_sided),
+        "limit_velocity": TrueValue(friction.limit_velocity if is_karnopp else 0.0),
+        "sliding_friction": TrueValue(
+            sliding.value, sliding.spread + abs(seen - 1.0) * sliding.value
+        ),
+        "stribeck_velocity": TrueValue(friction.stribeck_velocity if falls else math.nan),
+        "coulomb_asymmetry": TrueValue(friction.asymmetry),
+        "viscous_asymmetry": TrueValue(0.0),
+        "clock_offset": _offset(plant, instruments),
+    }
+
 
 _TRIES = 100
 _LEAST_MOVE = 0.008
@@ -65,68 +188,35 @@ class Case(NamedTuple):
 
 @dataclass(frozen=True)
 class Nominal:
-    """The user's knowledge of the valve.
+    """The user's knowledge of the valve."""
 
-    Attributes
-    ----------
-    diaphragm_area, pressure_reference, travel : float
-        S_a (m²), P_ref (Pa) and the travel (m).
-    pressure_minimum, pressure_maximum : float
-        Range of the pressure sensor, Pa.
-    has_spring : bool
-        Whether there is a spring.
-    """
-
+    # S_a (m²), P_ref (Pa) and the travel (m)
     diaphragm_area: float
     pressure_reference: float
     travel: float
+    # range of the pressure sensor, Pa
     pressure_minimum: float = -20e3
     pressure_maximum: float = 270e3
-    has_spring: bool = True
+    has_spring: bool = True  # whether there is a spring
 
 
 @dataclass(frozen=True, eq=False)
 class Record:
-    """A record as written by the sensors, with the truth.
+    """A record as written by the sensors, with the truth."""
 
-    Attributes
-    ----------
-    nominal : Nominal
-        The valve as described by the user.
-    pressure, position : Signal
-        Stamps (ns) and values (Pa, m).
-    truth : mapping of str to TrueValue
-        True numbers.
-    name : str
-        Name of the case.
-    kind : str
-        Kind of the valve.
-    slips : bool
-        Whether the packing slips.
-    share : float
-        F_c over the force of the spring.
-    rate : float
-        Samples per second.
-    imperfections : tuple of str
-        Names of the imperfections.
-    start : float
-        True position at the start of the record, m.
-    late : mapping of str to float
-        Clock offset of the stem ("delay"), lag of its sensor ("stem_lag"), and lag of the volume
-        minus that of the pressure sensor ("force_lag"), s.
-    """
-
-    nominal: Nominal
-    pressure: Signal
-    position: Signal
+    nominal: Nominal  # the valve as described by the user
+    pressure: Signal  # Pa
+    position: Signal  # m
     truth: dict[str, TrueValue]
-    name: str = ""
-    kind: str = ""
-    slips: bool = False
-    share: float = math.nan
-    rate: float = math.nan
+    name: str = ""  # of the case
+    kind: str = ""  # of the valve
+    slips: bool = False  # whether the packing slips
+    share: float = math.nan  # F_c over the force of the spring
+    rate: float = math.nan  # samples per second
     imperfections: tuple[str, ...] = ()
-    start: float = math.nan
+    start: float = math.nan  # true position at the start of the record, m
+    # clock offset of the stem ("delay"), lag of its sensor ("stem_lag"), and lag of the volume
+    # minus that of the pressure sensor ("force_lag"), s
     late: Mapping[str, float] = field(default_factory=dict)
 
 
@@ -237,33 +327,10 @@ def make_record(case: Case) -> Record:
     )
 
 
-_SIGNALS = ("pressure", "position")
-
-
 def save(record: Record, path: Path) -> None:
     """Write a record: ``<signal>_stamps`` (ns), ``<signal>`` (SI), and the rest as JSON."""
-    parts = {
-        name: value
-        for name, value in vars(record).items()
-        if name not in (*_SIGNALS, "nominal", "truth")
-    }
-    parts |= {"nominal": asdict(record.nominal)}
-    parts |= {"truth": {name: asdict(one) for name, one in record.truth.items()}}
-    arrays: dict[str, NDArray[Any]] = {}
-    for name in _SIGNALS:
-        signal = getattr(record, name)
+    parts, arrays = asdict(record), {}
+    for name in ("pressure", "position"):
+        signal = parts.pop(name)
         arrays |= {f"{name}_stamps": signal.stamps, name: signal.values}
-    arrays["about"] = np.array(json.dumps(parts))
-    np.savez_compressed(path, **arrays)  # type: ignore[arg-type]
-
-
-def load(folder: Path) -> Iterator[Record]:
-    """Read the records that `save` wrote, in order of their names."""
-    for path in sorted(folder.glob("*.npz")):
-        with np.load(path) as file:
-            parts: dict[str, Any] = json.loads(str(file["about"]))
-            parts |= {name: Signal(file[f"{name}_stamps"], file[name]) for name in _SIGNALS}
-        parts["nominal"] = Nominal(**parts["nominal"])
-        parts["truth"] = {name: TrueValue(**one) for name, one in parts["truth"].items()}
-        parts["imperfections"] = tuple(parts["imperfections"])
-        yield Record(**parts)
+    np.savez_compressed(path, about=json.dumps(parts), **arrays)

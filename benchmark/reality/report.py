@@ -136,10 +136,6 @@ def _declaration(row: Row) -> str:
     return row.alarms.get("high" if row.change > 1.0 else "low", "")
 
 
-def _is_declared(row: Row) -> bool:
-    return bool(_declaration(row))
-
-
 def _ratios(rows: _Rows, name: str = "") -> list[float]:
     """Return the half widths over those of the fit that starts at the truth."""
     return [
@@ -268,8 +264,8 @@ def _alarms(rows: _Rows) -> Sequence[object]:
 def _declared(rows: _Rows) -> str:
     """Return how often a change is declared, at which level, and how often it is uncertain."""
     errors = _count(lambda row: _declaration(row).startswith("ERROR"), rows)
-    unsure = _count(lambda row: not _is_declared(row) and "perhaps" in row.alarms, rows)
-    return f"{_of(_is_declared, rows)}, {errors} as ERROR; {unsure} perhaps"
+    unsure = _count(lambda row: not _declaration(row) and "perhaps" in row.alarms, rows)
+    return f"{_of(_declaration, rows)}, {errors} as ERROR; {unsure} perhaps"
 
 
 def _least(what: str, test: Callable[[Row], object], rows: _Rows, least: float) -> Bound:
@@ -302,7 +298,7 @@ def _bounds_of_alarms(rows: _Rows) -> Iterator[Bound]:
     yield _none("alarms of unchanged valves", alarmed, _share(alarmed, len(same)))
     for change, least in _DECLARED.items():
         changed = [row for row in rows if row.change == change]
-        yield _least(f"friction ×{change:g} declared", _is_declared, changed, least)
+        yield _least(f"friction ×{change:g} declared", _declaration, changed, least)
     yield _least("a baseline", lambda row: row.has_baseline, same, 0.95)
 
 

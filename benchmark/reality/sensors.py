@@ -17,60 +17,33 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from benchmark.reality.plants.kernel import GRID, Motion
+from benchmark.reality.plants import GRID, Motion
 
 
 @dataclass(frozen=True)
 class Stamping:
-    """The clock of one signal.
+    """The clock of one signal."""
 
-    Attributes
-    ----------
-    rate : float
-        Samples per second.
-    jitter : float
-        Largest shift of a sampling instant, share of the period; the stamp is correct.
-    stamp_error : float
-        Largest error of a stamp in either direction, s, independent per sample.
-    offset : float
-        Time by which the stamps are late, s.
-    drops : float
-        Share of lost messages, independent per message.
-    bursts, burst : int and float
-        Number and length (s) of pauses in which all messages are lost.
-    resolution : float
-        Resolution to which stamps are truncated, s; 0 for a nanosecond.
-    """
-
-    rate: float = 1000.0
+    rate: float = 1000.0  # samples per second
+    # largest shift of a sampling instant, share of the period; the stamp is correct
     jitter: float = 0.0
+    # largest error of a stamp in either direction, s, independent per sample
     stamp_error: float = 0.0
-    offset: float = 0.0
-    drops: float = 0.0
+    offset: float = 0.0  # time by which the stamps are late, s
+    drops: float = 0.0  # share of lost messages, independent per message
+    # number and length (s) of pauses in which all messages are lost
     bursts: int = 0
     burst: float = 0.0
-    resolution: float = 0.0
+    resolution: float = 0.0  # resolution to which stamps are truncated, s; 0 for a nanosecond
 
 
 class Times(NamedTuple):
-    """Instants of a signal.
+    """Instants of a signal."""
 
-    Attributes
-    ----------
-    period : float
-        Nominal time between two samples, s.
-    taken : ndarray of float, shape (n,)
-        Sampling times, s from the start of the record.
-    written : ndarray of float, shape (n,)
-        Readings of the clock at these times, s.
-    lost : ndarray of bool, shape (n,)
-        Whether the message is lost.
-    """
-
-    period: float
-    taken: NDArray[np.float64]
-    written: NDArray[np.float64]
-    lost: NDArray[np.bool_]
+    period: float  # nominal time between two samples, s
+    taken: NDArray[np.float64]  # sampling times, s from the start of the record; shape (n,)
+    written: NDArray[np.float64]  # readings of the clock at these times, s; shape (n,)
+    lost: NDArray[np.bool_]  # whether the message is lost; shape (n,)
 
 
 def sampling_times(stamping: Stamping, duration: float, random: np.random.Generator) -> Times:
@@ -101,99 +74,50 @@ def stamped(stamping: Stamping, written: NDArray[np.float64]) -> NDArray[np.int6
 
 
 class Signal(NamedTuple):
-    """A topic, or a column with its times.
+    """A topic, or a column with its times."""
 
-    Attributes
-    ----------
-    stamps : ndarray of int64, shape (n,)
-        Written times, ns, non-decreasing.
-    values : ndarray of float, shape (n,)
-        Pa or m.
-    """
-
-    stamps: NDArray[np.int64]
-    values: NDArray[np.float64]
+    stamps: NDArray[np.int64]  # written times, ns, non-decreasing; shape (n,)
+    values: NDArray[np.float64]  # pa or m; shape (n,)
 
 
 @dataclass(frozen=True)
 class Sensor:
-    """The sensor of one quantity.
+    """The sensor of one quantity."""
 
-    Attributes
-    ----------
-    noise : float
-        Standard deviation, SI unit.
-    colour : float
-        Correlation time of the noise, s; 0 for white noise.
-    low, high : float
-        Range, SI unit, for the converter and the dead band.
-    bits : int
-        Resolution of the converter; 0 for exact values.
-    lag : float
-        First-order lag, s.
-    drift : float
-        Drift of the zero, SI unit/s.
-    hold : float
-        Time for which a value is repeated, s; 0 for a new value in each sample.
-    dead_band : float
-        Change of the value that triggers a message, share of the range; 0 to send all.
-    silence : float
-        Longest time without a message under a dead band, s.
-    """
-
-    noise: float
+    noise: float  # standard deviation, SI unit
+    # range, SI unit, for the converter and the dead band
     low: float
     high: float
-    colour: float = 0.0
-    bits: int = 0
-    lag: float = 0.0
-    drift: float = 0.0
-    hold: float = 0.0
+    colour: float = 0.0  # correlation time of the noise, s; 0 for white noise
+    bits: int = 0  # resolution of the converter; 0 for exact values
+    lag: float = 0.0  # first-order lag, s
+    drift: float = 0.0  # drift of the zero, SI unit/s
+    hold: float = 0.0  # time for which a value is repeated, s; 0 for a new value in each sample
+    # change of the value that triggers a message, share of the range; 0 to send all
     dead_band: float = 0.0
-    silence: float = 10.0
+    silence: float = 10.0  # longest time without a message under a dead band, s
 
 
 @dataclass(frozen=True)
 class Instruments:
-    """Both sensors and their clocks.
+    """Both sensors and their clocks."""
 
-    Attributes
-    ----------
-    pressure, position : Sensor
-        The sensors.
-    pressure_stamping, position_stamping : Stamping
-        Their clocks.
-    together : bool
-        Whether both are sampled at the same instants and lost together, like rows of a table.
-    """
-
+    # the sensors
     pressure: Sensor = field(default_factory=lambda: Sensor(100.0, 0.0, 250e3))
     position: Sensor = field(default_factory=lambda: Sensor(10e-6, 0.0, 0.030))
+    # their clocks
     pressure_stamping: Stamping = field(default_factory=Stamping)
     position_stamping: Stamping = field(default_factory=Stamping)
+    # whether both are sampled at the same instants and lost together, like rows of a table
     together: bool = True
 
 
 def measured(
     motion: Motion, instruments: Instruments, duration: float, seed: int
 ) -> tuple[Signal, Signal]:
-    """Measure a motion.
+    """Measure `duration` seconds of a motion; return pressure and position.
 
-    Parameters
-    ----------
-    motion : Motion
-        The true signals.
-    instruments : Instruments
-        Sensors and clocks.
-    duration : float
-        Length of the record, s.
-    seed : int
-        Seed of the noise and of all effects on the messages.
-
-    Returns
-    -------
-    tuple of Signal
-        Pressure and position.
+    `seed` is that of the noise and of all effects on the messages.
     """
     streams = np.random.SeedSequence([seed, 2]).spawn(4)
     first, second, third, fourth = (np.random.default_rng(stream) for stream in streams)
@@ -222,8 +146,7 @@ def _lagged(values: NDArray[np.float64], lag: float) -> NDArray[np.float64]:
     memory = (1.0 - decay) * lag / GRID
     ahead, behind = 1.0 - memory, memory - decay
     start = [values[0] * (1.0 - ahead)]
-    response: NDArray[np.float64] = lfilter([ahead, behind], [1.0, -decay], values, zi=start)[0]
-    return response
+    return lfilter([ahead, behind], [1.0, -decay], values, zi=start)[0]
 
 
 def _noise(sensor: Sensor, times: Times, random: np.random.Generator) -> NDArray[np.float64]:

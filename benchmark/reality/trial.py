@@ -26,8 +26,7 @@ from scipy.signal import savgol_filter
 from benchmark.reality import package
 from benchmark.reality.motions import Kind
 from benchmark.reality.package import Answer, Number
-from benchmark.reality.records import Case, Record, make_record, save
-from benchmark.reality.truth import TrueValue
+from benchmark.reality.records import Case, Record, TrueValue, make_record, save
 
 EMPS = {"coulomb_friction": 20.3935, "viscous_friction": 203.5034}
 """IDIM-LS values by the authors of the data set: N, and N·s/m."""
@@ -127,11 +126,11 @@ class Row:
     """The outcome of one record.
 
     `part` is "plain", "stickslip" or "alarms". `name` to `change` describe the record (`Record`,
-    `Case`), with its length in s. `truth` and `numbers` have the names of `truth.NAMES`. `refusal`
+    `Case`), with its length in s. `truth` and `numbers` have the names of `truth_of`. `refusal`
     is why there is no result, and `failure` why there is no answer at all. `least_squares` is the
     sliding friction, N, and `seconds` the processor time. `has_baseline` is whether the healthy
     valve gave a baseline, and `alarms` are sentences by side (`package.alarms`). `found` to
-    `widths` come from `package.Ends`.
+    `widths` come from `package.ends`.
     """
 
     part: str
@@ -240,15 +239,6 @@ def _row(task: Task, case: Case, record: Record) -> tuple[Row, Answer]:
     return row, answer
 
 
-def _with_ends(task: Task, row: Row, record: Record, answer: Answer) -> Row:
-    """Add the comparison of the search with a fit that starts at the truth."""
-    ends, failure, _ = _within(task.limit, lambda: package.ends(record, answer))
-    if ends is None:
-        return replace(row, failure=row.failure or failure)
-    found, begun, coulomb, widths = ends
-    return replace(row, found=found, begun=begun, coulomb=coulomb, widths=widths)
-
-
 def _made(task: Task, case: Case) -> Record:
     record = make_record(case)
     if task.folder is not None:
@@ -278,7 +268,8 @@ def tried(task: Task) -> list[Row]:
         return [Row(task.part, case.name, case.motion.value, failure=str(error))]
     row, answer = _row(task, case, record)
     if task.part != "alarms":
-        return [_with_ends(task, row, record, answer)]
+        ends, failure, _ = _within(task.limit, partial(package.ends, record, answer))
+        return [replace(row, failure=row.failure or failure, **(ends or {}))]
     has_baseline = answer.native is not None and package.is_baseline(answer)
     rows = []
     for again, change in enumerate(CHANGES, start=1):

@@ -11,7 +11,6 @@
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -24,33 +23,19 @@ from valve_friction_ros.model import KarnoppParameters
 from valve_friction_ros.signals import differentiate
 
 
-@dataclass(frozen=True)
-class Check:
+class Check(NamedTuple):
     """A comparison with the paper, in the paper's unit; the criterion was set before the values.
 
-    `item` is the section of the report, from 1. Raises ValueError if a mismatch has no reason, or a
-    match has one.
+    `why` is the reason of a mismatch, and `item` the section of the report, from 1.
     """
 
-    item: int
     name: str
     paper: str
     ours: str
     criterion: str
     matched: bool
-    why: str = ""
-
-    def __post_init__(self) -> None:
-        """Refuse a mismatch without a reason, or a match with one."""
-        if self.matched == bool(self.why):
-            raise ValueError(f"{self.name}: a mismatch needs a reason, and a match has none")
-
-
-def compared(
-    item: int, name: str, paper: str, ours: str, criterion: str, matched: bool, why: str
-) -> Check:
-    """Return a check; a match drops the reason."""
-    return Check(item, name, paper, ours, criterion, bool(matched), "" if matched else why)
+    why: str
+    item: int = 0
 
 
 def written(value: float, digits: int = 4) -> str:
@@ -64,25 +49,17 @@ def written(value: float, digits: int = 4) -> str:
 
 
 def within(
-    item: int,
     name: str,
     paper: float,
     ours: float,
     share: float,
     unit: str,
     why: str,
-    digits: int = 4,
 ) -> Check:
     """Compare two numbers, which match within a share of the paper's number."""
-    return compared(
-        item,
-        name,
-        f"{written(paper, digits)} {unit}",
-        f"{written(ours, digits)} {unit}",
-        f"within {100 * share:g} %",
-        abs(ours - paper) <= share * abs(paper),
-        why,
-    )
+    wanted, found = f"{written(paper)} {unit}", f"{written(ours)} {unit}"
+    matched = abs(ours - paper) <= share * abs(paper)
+    return Check(name, wanted, found, f"within {100 * share:g} %", matched, why)
 
 
 def count(checks: Sequence[Check]) -> str:
@@ -119,7 +96,6 @@ Chosen before the comparison: the scatter of Table 1 between its two packings, p
 
 
 def parameter_checks(
-    item: int,
     place: str,
     wanted: KarnoppParameters,
     found: dict[str, float],
@@ -129,7 +105,6 @@ def parameter_checks(
     for name, value in found.items():
         symbol, unit = NOTATION[name]
         yield within(
-            item,
             f"{place}, {symbol}",
             getattr(wanted, name),
             value,
@@ -152,8 +127,7 @@ def dead_band_checks(low: BenchResult, high: BenchResult) -> Iterator[Check]:
         truth = 2 * one.bench.truth.static_friction / one.bench.valve.force_per_drive
         share = 100 * truth / paper.PRESSURE_SPAN
         band = one.steps.dead_band
-        yield compared(
-            8,
+        yield Check(
             f"ISA dead band, {one.bench.name} (truth instead of paper)",
             f"{share:.2f} %",
             f"{band.ignored:.2f} to {band.answered:.2f} %",
@@ -169,8 +143,7 @@ def noise_checks(programme: Programme) -> Iterator[Check]:
         truth, found = programme.results[name].bench.truth, estimate.values
         errors = {key: abs(found[key] / getattr(truth, key) - 1) for key in NOTATION}
         mass = errors.pop("mass")
-        yield compared(
-            9,
+        yield Check(
             f"model 1 without noise, {name} (truth instead of paper)",
             "k, F_v, F_c, F_s, m",
             f"off by {100 * max(errors.values()):.1g} %, m by {100 * mass:.1f} %",
@@ -185,8 +158,7 @@ def noise_checks(programme: Programme) -> Iterator[Check]:
         level = programme.scatter.level(name, bench.noise)
         ours = level.deviation["mass"] / bench.truth.mass
         matched = 0.5 <= ours / published <= 2
-        yield compared(
-            9,
+        yield Check(
             f"Table 1, scatter of the regressed mass, {name}",
             f"{100 * published:.0f} % (rms, about the nominal mass)",
             f"{100 * ours:.2g} %",
@@ -204,7 +176,7 @@ def graphite_checks(programme: Programme) -> Iterator[Check]:
     for method, model in one.identified.models().items():
         found = {name: getattr(model, name) for name in names}
         yield from parameter_checks(
-            10, f"graphite (truth instead of paper), {method}", one.bench.truth, found, {}
+            f"graphite (truth instead of paper), {method}", one.bench.truth, found, {}
         )
 
 
@@ -234,8 +206,7 @@ def validation_checks(programme: Programme) -> Iterator[Check]:
     low, high = (programme.results[name].sine for name in paper.PACKINGS)
     for model in ("model 1", "model 2"):
         fits = [100 * one[model].validation.fit for one in (low, high)]
-        yield compared(
-            7,
+        yield Check(
             f"section 5, sine, {model}",
             "slightly worse with high friction",
             f"fit {fits[0]:.4f} % (low), {fits[1]:.4f} % (high)",
@@ -250,8 +221,7 @@ def _of_figure(programme: Programme, name: str, excitation: str, figure: str) ->
     result = programme.results[name]
     models = result.sine if excitation == "sine" else result.isa
     fits = [models[model].validation.fit for model in ("model 1", "model 2")]
-    yield compared(
-        7,
+    yield Check(
         f"{figure}, both models describe the valve",
         "quite well",
         " and ".join(f"{100 * fit:.2f} %" for fit in fits),
@@ -262,8 +232,7 @@ def _of_figure(programme: Programme, name: str, excitation: str, figure: str) ->
     rivals = programme.scatter.of(name, excitation)
     errors = [1e6 * models[model].true_rms for model in ("model 1", "model 2")]
     better = errors[0] < errors[1] and rivals.wins == len(rivals.model_1)
-    yield compared(
-        7,
+    yield Check(
         f"{figure}, model 1 beats model 2",
         "yes",
         f"{errors[0]:.2g} against {errors[1]:.2g} µm rms; so in {rivals.wins} of "
@@ -276,8 +245,7 @@ def _of_figure(programme: Programme, name: str, excitation: str, figure: str) ->
         return  # the paper finds both models equal here
     visible = models["model 2"].true_rms >= _VISIBLE
     published = 1e6 * models["paper's model 2"].true_rms
-    yield compared(
-        7,
+    yield Check(
         f"{figure}, model 2 deviates visibly",
         "yes",
         f"{errors[1]:.2g} µm; with the paper's numbers of model 2 {published:.0f} µm",
@@ -295,8 +263,7 @@ def _limit_velocity(programme: Programme) -> Check:
         for name in paper.PACKINGS
         for one in (programme.results[name].sine, programme.results[name].isa)
     ]
-    return compared(
-        7,
+    return Check(
         "section 3, effect of DV = 1 % of |ẋ|max",
         "negligible",
         f"rms changes by {100 * max(changes):.1g} % of the travel at most",
@@ -309,25 +276,28 @@ def _limit_velocity(programme: Programme) -> Check:
 def all_checks(programme: Programme) -> tuple[Check, ...]:
     """Compare the whole programme with the paper."""
     low, high = (programme.results[name] for name in paper.PACKINGS)
-    return (
-        *_excitations(low),
-        *_signature(low, high),
-        *_bias(low, high),
-        *_sweep(low),
-        *_table(low),
-        *_table(high),
-        *_terms(high),
-        *validation_checks(programme),
-        *dead_band_checks(low, high),
-        *noise_checks(programme),
-        *graphite_checks(programme),
+    sections = (
+        _excitations(low),
+        _signature(low, high),
+        _bias(low, high),
+        _sweep(low),
+        (*_table(low), *_table(high)),
+        _terms(high),
+        validation_checks(programme),
+        dead_band_checks(low, high),
+        noise_checks(programme),
+        graphite_checks(programme),
+    )
+    return tuple(
+        check._replace(item=number)
+        for number, checks in enumerate(sections, start=1)
+        for check in checks
     )
 
 
 def _excitations(low: BenchResult) -> Iterator[Check]:
     shown = low.identified.top_speed * 330 / 350
-    yield compared(
-        1,
+    yield Check(
         "Fig. 3, largest δv of the sweep, low",
         "above 0.012 m/s",
         f"{written(shown, 3)} m/s",
@@ -340,8 +310,7 @@ def _excitations(low: BenchResult) -> Iterator[Check]:
         ours = 100 * (pressure - bottom) / paper.PRESSURE_SPAN
         places = len(share.partition(".")[2])
         matched = f"{ours:.{places}f}" == share
-        yield compared(
-            1,
+        yield Check(
             f"section 5, {which} pressure of the sine",
             f"{share} %",
             f"{ours:.2f} %",
@@ -355,8 +324,7 @@ def _excitations(low: BenchResult) -> Iterator[Check]:
 def _signature(low: BenchResult, high: BenchResult) -> Iterator[Check]:
     zones = [one.identified.signature.dead_zone for one in (low, high)]
     ratio = zones[1] / zones[0]
-    yield compared(
-        2,
+    yield Check(
         "Fig. 2, dead zone, high over low",
         "at least 3",
         f"{ratio:.2f}",
@@ -365,8 +333,7 @@ def _signature(low: BenchResult, high: BenchResult) -> Iterator[Check]:
         "the noise of this run hides it",
     )
     tops = [float(one.experiments.triangle.measured.position.max()) * 1e3 for one in (low, high)]
-    yield compared(
-        2,
+    yield Check(
         "Fig. 2, largest stroke",
         "smaller with high friction",
         f"low {tops[0]:.2f} mm, high {tops[1]:.2f} mm",
@@ -377,8 +344,7 @@ def _signature(low: BenchResult, high: BenchResult) -> Iterator[Check]:
     for one in (low, high):
         found = one.identified.force_balance.values
         equal = found["static_friction"] == found["coulomb_friction"]
-        yield compared(
-            2,
+        yield Check(
             f"Fig. 2, slip jump, {one.bench.name}",
             "none",
             "none" if equal else "found",
@@ -392,7 +358,6 @@ def _bias(low: BenchResult, high: BenchResult) -> Iterator[Check]:
     for one in (low, high):
         name, signature = one.bench.name, one.identified.signature
         yield within(
-            3,
             f"(16), k of (15), {name}",
             paper.SIGNATURE_SPRING[name],
             signature.spring_constant,
@@ -405,8 +370,7 @@ def _bias(low: BenchResult, high: BenchResult) -> Iterator[Check]:
         name, bias = one.bench.name, one.identified.signature.position_bias
         published = paper.SIGNATURE_BIAS[name]
         matched = abs(bias - published) <= 0.05e-3
-        yield compared(
-            3,
+        yield Check(
             f"(16), x̄ of (14), {name}",
             f"{published * 1e3:.2f} mm",
             f"{bias * 1e3:.4f} mm",
@@ -421,8 +385,7 @@ def _sweep(low: BenchResult) -> Iterator[Check]:
     sweep = free.sweep
     bottom, top = free.region
     matched = bottom <= paper.CHOSEN_THRESHOLD <= top
-    yield compared(
-        4,
+    yield Check(
         "Fig. 4, δv of the least σ_s, low",
         "around 0.01 m/s",
         f"{bottom:.4f} to {top:.4f} m/s",
@@ -432,8 +395,7 @@ def _sweep(low: BenchResult) -> Iterator[Check]:
         "where a few samples of nearly one speed are left, and nothing else marks 0.01 m/s",
     )
     place = int(np.argmin(np.abs(sweep.thresholds - paper.CHOSEN_THRESHOLD)))
-    yield compared(
-        4,
+    yield Check(
         "Fig. 4, R²_s at 0.01 m/s, low",
         "maximal, close to 1",
         f"{sweep.r_squared[place]:.6f}",
@@ -448,8 +410,7 @@ def _sweep(low: BenchResult) -> Iterator[Check]:
             np.abs(sweep.thresholds - paper.CHOSEN_THRESHOLD) < 1e-3,
         )
     ]
-    yield compared(
-        4,
+    yield Check(
         "Fig. 3, scatter of F_c above 0.012 m/s, low",
         "high",
         f"{written(spreads[0], 3)} N, around 0.01 m/s {written(spreads[1], 3)} N",
@@ -464,7 +425,6 @@ def _table(one: BenchResult) -> Iterator[Check]:
     mass = {"mass": found.free.chosen_estimates["mass"]}
     sweep = {key: found.published.values[key] for key in NOTATION}
     yield from parameter_checks(
-        5,
         f"Table 1, model 1, {name}",
         paper.MODEL_1[name],
         {**sweep, **mass},
@@ -475,7 +435,6 @@ def _table(one: BenchResult) -> Iterator[Check]:
     )
     balance = {key: found.force_balance.values[key] for key in NOTATION if key != "mass"}
     yield from parameter_checks(
-        5,
         f"Table 1, model 2, {name}",
         paper.MODEL_2[name],
         balance,
@@ -493,8 +452,7 @@ def _terms(high: BenchResult) -> Iterator[Check]:
     peaks = {name: float(np.max(np.abs(term))) for name, term in force_terms(high).terms.items()}
     spring, coulomb, viscous, inertia = peaks.values()
     forces = f"{spring:.0f}, {coulomb:.0f}, {viscous:.0f}, {inertia:.2g} N"
-    yield compared(
-        6,
+    yield Check(
         "Fig. 5, order of the terms, high",
         "k·x, then F_c",
         forces,
@@ -502,8 +460,7 @@ def _terms(high: BenchResult) -> Iterator[Check]:
         spring > coulomb > max(viscous, inertia),
         "the noise of this run hides it",
     )
-    yield compared(
-        6,
+    yield Check(
         "Fig. 5, F_v·ẋ and m·ẍ, high",
         "negligible",
         f"{100 * viscous / spring:.2g} % and {100 * inertia / spring:.1g} % of k·x",

@@ -11,7 +11,6 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -279,8 +278,8 @@ def _level(bench: Bench, noise: SensorNoise, plan: Plan, seeds: int) -> Level:
     return Level(
         bench.name,
         noise,
-        MappingProxyType(dict(zip(_SCATTERED, map(float, mean), strict=True))),
-        MappingProxyType(dict(zip(_SCATTERED, map(float, deviation), strict=True))),
+        dict(zip(_SCATTERED, map(float, mean), strict=True)),
+        dict(zip(_SCATTERED, map(float, deviation), strict=True)),
     )
 
 

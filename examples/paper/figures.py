@@ -10,7 +10,6 @@
 """The figures of the report, each with its caption, in the order of the paper."""
 
 from collections.abc import Mapping
-from types import MappingProxyType
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -19,7 +18,7 @@ from matplotlib.figure import Figure
 from paper import published_numbers as paper
 from paper.checks import FIGURES, NOTATION, force_terms
 from paper.experiments import Experiment
-from paper.programme import BenchResult, Comparison, Programme
+from paper.programme import BenchResult, Programme
 from valve_friction_ros.figures import draw_curves
 from valve_friction_ros.figures.panels import COLOURS, dress, labelled_in, legend_above, thinned
 from valve_friction_ros.reports import Picture
@@ -222,10 +221,10 @@ def quality_figure(result: BenchResult) -> Figure:
     return figure
 
 
-def validation_figure(
-    result: BenchResult, experiment: Experiment, models: dict[str, Comparison]
-) -> Figure:
-    """Draw one of Figs. 6 to 9: measured stem, models, and their errors."""
+def validation_figure(result: BenchResult, is_sine: bool) -> Figure:
+    """Draw one of Figs. 6 to 9, sine or ISA steps: measured stem, models, and their errors."""
+    experiment = result.experiments.sine if is_sine else result.experiments.isa
+    models = result.sine if is_sine else result.isa
     styles = {
         "model 1": (COLOURS[0], "-"),
         "model 2": (COLOURS[1], "--"),
@@ -264,55 +263,31 @@ Pictures = Mapping[str, Picture]
 def draw_figures(programme: Programme) -> Pictures:
     """Draw all figures with captions, by file name."""
     low, high, graphite = (programme.results[name] for name in (*paper.PACKINGS, "graphite"))
-    figures: dict[str, tuple[Figure, str]] = {
-        "excitations": (
-            excitations_figure(low),
-            "The four excitations as commanded, and behind the V/P converter.",
-        ),
-        "figure_1": (input_output_figure(low, high), "Fig. 1: input and stem, low and high."),
-        "figure_2": (
-            signatures_figure(low, high),
-            "Fig. 2: valve signatures with the breakaway points P1 (up) and P2 (down) and the "
-            "dead zones (arrows).",
-        ),
-        "figure_2_graphite": (
-            signatures_figure(graphite),
-            "As Fig. 2, graphite packing: the stem jumps as it breaks away.",
-        ),
-    }
+    pictures: dict[str, Picture] = {}
+
+    def keep(name: str, figure: Figure, text: str) -> None:
+        pictures[name] = Picture(figure, text, text)
+
+    what = "The four excitations as commanded, and behind the V/P converter."
+    keep("excitations", excitations_figure(low), what)
+    keep("figure_1", input_output_figure(low, high), "Fig. 1: input and stem, low and high.")
+    what = "valve signatures with the breakaway points P1 (up) and P2 (down) and the dead zones"
+    keep("figure_2", signatures_figure(low, high), f"Fig. 2: {what} (arrows).")
+    what = "As Fig. 2, graphite packing: the stem jumps as it breaks away."
+    keep("figure_2_graphite", signatures_figure(graphite), what)
     for one in (low, high, graphite):
         name = one.bench.name
         shown = packing_name(one) + ("." if name == "low" else " (not in the paper).")
-        figures |= {
-            f"figure_3_{name}": (estimates_figure(one), f"Fig. 3: estimates over δv, {shown}"),
-            f"figure_4_{name}": (
-                quality_figure(one),
-                f"Fig. 4: σ_s of (17) and R²_s of (18) over δv, {shown}",
-            ),
-        }
-    figures["figure_5"] = (
-        force_terms_figure(high),
-        "Fig. 5: contribution of each term of (4), sine, high friction.",
-    )
+        keep(f"figure_3_{name}", estimates_figure(one), f"Fig. 3: estimates over δv, {shown}")
+        what = f"Fig. 4: σ_s of (17) and R²_s of (18) over δv, {shown}"
+        keep(f"figure_4_{name}", quality_figure(one), what)
+    what = "Fig. 5: contribution of each term of (4), sine, high friction."
+    keep("figure_5", force_terms_figure(high), what)
     for (name, excitation), place in FIGURES.items():
-        one = programme.results[name]
-        is_sine = excitation == "sine"
-        experiment = one.experiments.sine if is_sine else one.experiments.isa
-        figures[place.lower().replace("fig. ", "figure_")] = (
-            validation_figure(one, experiment, dict(one.sine if is_sine else one.isa)),
-            f"{place}: validation, {name} friction, {excitation}; errors against the stem "
-            "without sensor noise.",
-        )
-    figures |= {
-        "validation_graphite_sine": (
-            validation_figure(graphite, graphite.experiments.sine, dict(graphite.sine)),
-            "As Figs. 6 and 7, graphite packing.",
-        ),
-        "validation_graphite_isa": (
-            validation_figure(graphite, graphite.experiments.isa, dict(graphite.isa)),
-            "As Figs. 8 and 9, graphite packing.",
-        ),
-    }
-    return MappingProxyType(
-        {name: Picture(figure, text, text) for name, (figure, text) in figures.items()}
-    )
+        what = f"{place}: validation, {name} friction, {excitation}; errors against the stem "
+        figure = validation_figure(programme.results[name], is_sine=excitation == "sine")
+        keep(place.lower().replace("fig. ", "figure_"), figure, f"{what}without sensor noise.")
+    for excitation, places in (("sine", "Figs. 6 and 7"), ("isa", "Figs. 8 and 9")):
+        figure = validation_figure(graphite, is_sine=excitation == "sine")
+        keep(f"validation_graphite_{excitation}", figure, f"As {places}, graphite packing.")
+    return pictures

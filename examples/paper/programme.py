@@ -12,7 +12,6 @@
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -202,7 +201,7 @@ def _result(bench: Bench, experiments: Experiments, found: Identified) -> BenchR
         )
         models["paper's model 2"] = paper.MODEL_2[bench.name]
     sine, isa = (
-        MappingProxyType({name: compared(bench, one, model) for name, model in models.items()})
+        {name: compared(bench, one, model) for name, model in models.items()}
         for one in (experiments.sine, experiments.isa)
     )
     return BenchResult(bench, experiments, found, sine, isa, _steps(bench, experiments.isa))
@@ -267,9 +266,7 @@ def run_programme(
     low = experiments["low"].square.clean
     mass_by_bias = _mass_by_bias(benches["low"], low, without_noise["low"].threshold)
     scatter = measure_scatter(published, plan, seeds, progress)
-    return Programme(
-        MappingProxyType(results), MappingProxyType(without_noise), mass_by_bias, scatter
-    )
+    return Programme(results, without_noise, mass_by_bias, scatter)
 
 
 def _mass_by_bias(bench: Bench, recording: Recording, threshold: float) -> tuple[MassByBias, ...]:

@@ -10,7 +10,7 @@
 """The report: sections in the order of the paper."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from paper import published_numbers as paper
@@ -20,8 +20,16 @@ from paper.programme import BenchResult, Comparison, Programme
 from valve_friction_ros.identification import StepMetrics
 from valve_friction_ros.reports import Block, Column, Page, PageTable, Paragraph, Section
 
+_WORDS = ("packing", "parameter", "model", "excitation", "stem")
+"""Titles of the columns that hold no numbers."""
 
-def check_table(checks: Sequence[Check], caption: str = "") -> PageTable:
+
+def _table(titles: Sequence[str], rows: Iterable[Sequence[str]], caption: str) -> PageTable:
+    columns = tuple(Column(title, is_number=title not in _WORDS) for title in titles)
+    return PageTable(columns, tuple(map(tuple, rows)), caption)
+
+
+def check_table(checks: Sequence[Check]) -> PageTable:
     """List checks, with mismatches marked and explained."""
     rows = tuple(
         (
@@ -35,7 +43,7 @@ def check_table(checks: Sequence[Check], caption: str = "") -> PageTable:
     )
     titles = ("", "compared", "paper", "here", "criterion")
     marked = tuple(number for number, one in enumerate(checks) if not one.matched)
-    return PageTable(tuple(map(Column, titles)), rows, caption, marked)
+    return PageTable(tuple(map(Column, titles)), rows, "", marked)
 
 
 def signature_table(results: Sequence[BenchResult]) -> PageTable:
@@ -59,6 +67,7 @@ def signature_table(results: Sequence[BenchResult]) -> PageTable:
             )
         )
     titles = (
+        "packing",
         "k of (15) [N/m]",
         "paper",
         "truth",
@@ -68,10 +77,7 @@ def signature_table(results: Sequence[BenchResult]) -> PageTable:
         "dead zone [kPa]",
         "points P1 + P2",
     )
-    columns = (Column("packing"), *(Column(title, is_number=True) for title in titles))
-    return PageTable(
-        columns, tuple(rows), "(14) to (16); ± one standard error, between the strokes"
-    )
+    return _table(titles, rows, "(14) to (16); ± one standard error, between the strokes")
 
 
 def _interval(parameter: Mapping[str, Any]) -> str:
@@ -107,16 +113,9 @@ def parameter_table(result: BenchResult) -> PageTable:
                 *(_interval(parameters[key]) for parameters in shown),
             )
         )
-    titles = (
-        "paper, model 1",
-        "paper, model 2",
-        "truth",
-        "model 1",
-        "model 2",
-        "bench",
-    )
-    columns = (Column("parameter"), *(Column(title, is_number=True) for title in titles))
-    return PageTable(columns, tuple(rows), f"{packing_name(result)}; ± half the 95 % interval")
+    ours = ("truth", "model 1", "model 2", "bench")
+    titles = ("parameter", "paper, model 1", "paper, model 2", *ours)
+    return _table(titles, rows, f"{packing_name(result)}; ± half the 95 % interval")
 
 
 def validation_table(models: Mapping[str, Comparison], caption: str) -> PageTable:
@@ -133,14 +132,14 @@ def validation_table(models: Mapping[str, Comparison], caption: str) -> PageTabl
         for name, one in models.items()
     )
     titles = (
+        "model",
         "fit [%]",
         "rms error [µm]",
         "largest [µm]",
         "rms, noise-free stem [µm]",
         "largest, noise-free stem [µm]",
     )
-    columns = (Column("model"), *(Column(title, is_number=True) for title in titles))
-    return PageTable(columns, rows, caption)
+    return _table(titles, rows, caption)
 
 
 def rivals_table(programme: Programme) -> PageTable:
@@ -157,14 +156,9 @@ def rivals_table(programme: Programme) -> PageTable:
         )
         for one in programme.scatter.rivals
     )
-    columns = (
-        Column("packing"),
-        Column("excitation"),
-        Column("model 1, rms [µm]", is_number=True),
-        Column("model 2, rms [µm]", is_number=True),
-        Column("model 1 closer", is_number=True),
-    )
-    return PageTable(columns, rows, "Other seeds of the noise; errors against the noise-free stem")
+    errors = ("model 1, rms [µm]", "model 2, rms [µm]")
+    titles = ("packing", "excitation", *errors, "model 1 closer")
+    return _table(titles, rows, "Other seeds of the noise; errors against the noise-free stem")
 
 
 def noise_table(programme: Programme) -> PageTable:
@@ -178,10 +172,9 @@ def noise_table(programme: Programme) -> PageTable:
         )
         for one in programme.scatter.levels
     )
-    titles = ("stem [µm]", "pressure [Pa]", "m [kg]", "F_v [N·s/m]", "F_c [N]", "k [N/m]")
-    columns = (Column("packing"), *(Column(title, is_number=True) for title in titles))
-    return PageTable(
-        columns,
+    noise = ("stem [µm]", "pressure [Pa]")
+    return _table(
+        ("packing", *noise, "m [kg]", "F_v [N·s/m]", "F_c [N]", "k [N/m]"),
         rows,
         "Model 1, as regressed with the true x̄, by standard deviation of the sensor noise; "
         "± one standard deviation over the seeds",
@@ -190,7 +183,6 @@ def noise_table(programme: Programme) -> PageTable:
 
 def step_table(result: BenchResult) -> PageTable:
     """Show the response to each step of the ISA test."""
-    rows = tuple(_step_row(step) for step in result.steps.steps)
     titles = (
         "begins [s]",
         "step [%]",
@@ -200,11 +192,10 @@ def step_table(result: BenchResult) -> PageTable:
         "T63 [s]",
         "T86 [s]",
         "overshoot [%]",
+        "stem",
     )
-    columns = (*(Column(title, is_number=True) for title in titles), Column("stem"))
-    return PageTable(
-        columns, rows, f"{packing_name(result)}; in percent of pressure range and travel"
-    )
+    caption = f"{packing_name(result)}; in percent of pressure range and travel"
+    return _table(titles, map(_step_row, result.steps.steps), caption)
 
 
 def _step_row(step: StepMetrics) -> tuple[str, ...]:
@@ -234,9 +225,9 @@ def step_summary_table(results: Sequence[BenchResult]) -> PageTable:
                 f"{sum(step.moved for step in one.steps.steps)} of {len(one.steps.steps)}",
             )
         )
-    titles = ("dead band [%]", "2·F_s/S_a [%]", "resolution [%]", "steps that moved the stem")
-    columns = (Column("packing"), *(Column(title, is_number=True) for title in titles))
-    return PageTable(columns, tuple(rows), "Dead band and resolution lie between the two values")
+    bands = ("dead band [%]", "2·F_s/S_a [%]", "resolution [%]")
+    titles = ("packing", *bands, "steps that moved the stem")
+    return _table(titles, rows, "Dead band and resolution lie between the two values")
 
 
 _MISSED = "Each stands in its section too, beside what matches."

@@ -18,22 +18,32 @@ import numpy as np
 import pytest
 
 from benchmark.reality import package, records, trial
-from benchmark.reality.imperfections import (
-    IMPERFECTIONS,
-    Draft,
-    drawn_imperfections,
-    instruments_of,
-)
 from benchmark.reality.motions import Kind, drawn_drive
 from benchmark.reality.package import Answer, Number
-from benchmark.reality.plants import Body, Friction, Law, Plant, Trend, move
-from benchmark.reality.plants.kernel import GRID, Loop, Motion
-from benchmark.reality.records import Case, Nominal, Record, make_record
+from benchmark.reality.plants import (
+    GRID,
+    Body,
+    Friction,
+    Law,
+    Motion,
+    Plant,
+    Trend,
+    move,
+    open_loop,
+)
+from benchmark.reality.records import Case, Nominal, Record, TrueValue, make_record, truth_of
 from benchmark.reality.report import bounds, in_mode, is_useful, judged, report
 from benchmark.reality.sensors import Instruments, Sensor, Signal, Stamping, measured
 from benchmark.reality.trial import Row, Task, sliding_friction, tried
-from benchmark.reality.truth import TrueValue, truth_of
-from benchmark.reality.valves import DrawnValve, drawn_cylinder, drawn_valve
+from benchmark.reality.valves import (
+    IMPERFECTIONS,
+    Draft,
+    DrawnValve,
+    drawn_cylinder,
+    drawn_imperfections,
+    drawn_valve,
+    instruments_of,
+)
 
 
 def valves(count, slips=False, **options):
@@ -44,7 +54,7 @@ def valves(count, slips=False, **options):
 def test_the_actuator_strokes_the_valve(grown):
     for valve in valves(8, slips=True, reserve=2.2 if grown > 1.0 else 1.0):
         plant = replace(valve.plant, friction=valve.plant.friction.scaled(grown))
-        loop = Loop(False, False, 0.0, 1.0, 1000, 1.0, valve.low, valve.high - valve.low, 1e-3)
+        loop = open_loop(valve.low, valve.high - valve.low, 1e-3)
         points = round(2.0 * valve.settling / GRID) + 20_000
         there_and_back = np.concatenate([np.linspace(0.0, 1.0, points), np.ones(points)])
         signal = np.concatenate([there_and_back, 1.0 - there_and_back])
@@ -131,7 +141,7 @@ SLIPPING = Friction(200.0, 350.0, 4e3, stribeck_velocity=1e-3)
 
 
 def truth(plant, drawn_instruments):
-    loop = Loop(False, False, 0.0, 1.0, 1000, 1.0, 0.0, 4e5, 0.1)
+    loop = open_loop(0.0, 4e5, 0.1)
     points = round(4.0 / GRID)
     signal = np.concatenate([np.linspace(0.2, 0.6, points), np.linspace(0.6, 0.2, points)])
     motion = move(plant, loop, signal, np.zeros(signal.size), 0.0)
@@ -284,17 +294,7 @@ def test_the_package_answers_and_is_compared_with_the_truth(monkeypatch):
     assert 0.5 < one.numbers["coulomb_friction"].half_width / one.widths["coulomb_friction"] < 2.0
 
 
-LOOP = Loop(
-    closed=False,
-    flow=False,
-    gain=0.0,
-    integral_time=1.0,
-    every=1000,
-    process_lag=1.0,
-    bottom=0.0,
-    span=1e5,
-    converter_lag=1e-3,
-)
+LOOP = open_loop(0.0, 1e5, 1e-3)
 BODY = Body(1.6, 2e5, 500.0, pressure_reference=0.0)
 FRICTION = Friction(400.0, 600.0, 2e4, stribeck_velocity=1e-3)
 

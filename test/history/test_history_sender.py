@@ -32,7 +32,7 @@ from histories import (
 )
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from postgres import database_of, sending
+from local_server import database_of, sending
 from waiting import wait_until
 from writers import writer
 

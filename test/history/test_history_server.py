@@ -20,8 +20,7 @@ import pytest
 import sqlalchemy as sa
 from full_history import all_of, fill, filled
 from histories import START, VALVE, make_version, select, success
-from local_server import certificate_pair
-from postgres import database_of, sending
+from local_server import certificate_pair, database_of, sending
 from waiting import wait_until
 
 from valve_friction_ros.history import (

@@ -11,7 +11,7 @@
 
 import math
 from dataclasses import replace
-from itertools import pairwise
+from itertools import pairwise, product
 
 import numpy as np
 import pytest
@@ -41,9 +41,9 @@ SAMPLE_PERIOD = 1e-3
 # Tolerances of the integration. A step errs by about RTOL of 29 mm and of 0.07 m/s, and such errors
 # die out with the stem's own 24 to 340 ms, in which it makes about a hundred steps.
 RTOL, ATOL = 1e-10, 1e-13
-ASKED_POSITION = 1e-6  # m
 AGREED_POSITION = 1e-9  # m
 AGREED_VELOCITY = 1e-9  # m/s
+BY_CHORDS = 1e-7  # m
 
 
 def leaves(position, pull, slope, duration, valve, parameters):
@@ -52,7 +52,8 @@ def leaves(position, pull, slope, duration, valve, parameters):
     for side, blocked in ((1, position >= valve.travel), (-1, position <= 0 < math.inf)):
         if blocked and math.isfinite(valve.travel):
             continue
-        missing = parameters.static_friction - side * pull
+        limit = (1 + side * parameters.coulomb_asymmetry) * parameters.static_friction
+        missing = limit - side * pull
         if missing < 0:
             found.append((0.0, side))
         elif side * slope > 0:
@@ -63,12 +64,17 @@ def leaves(position, pull, slope, duration, valve, parameters):
 def slide(state, force, slope, duration, side, valve, parameters):
     """Integrate the sliding stem until rest, travel stop or the end of the stretch."""
     mass, spring = parameters.mass, parameters.spring_constant
-    coulomb, viscous = side * parameters.coulomb_friction, parameters.viscous_friction
+    coulomb, static = parameters.coulomb_friction, parameters.static_friction
+    viscous = (1 + side * parameters.viscous_asymmetry) * parameters.viscous_friction
+    falls_at, scale = parameters.stribeck_velocity, side * (1 + side * parameters.coulomb_asymmetry)
     end_of_travel = valve.travel if side > 0 else (0.0 if valve.travel < math.inf else -math.inf)
 
     def motion(t, state):
         x, v = state
-        return v, (force + slope * t - spring * x - coulomb - viscous * v) / mass
+        level = coulomb
+        if falls_at:
+            level += (static - coulomb) * math.exp(-((max(side * v, 0.0) / falls_at) ** 2))
+        return v, (force + slope * t - spring * x - scale * level - viscous * v) / mass
 
     def rest(t, state):
         return side * state[1] if t > 0 else 1.0
@@ -76,6 +82,7 @@ def slide(state, force, slope, duration, side, valve, parameters):
     def stop(_, state):
         return side * (end_of_travel - state[0])
 
+    linear = np.array([[0.0, 1.0], [-spring / mass, -viscous / mass]])
     for event in (rest, stop):
         event.terminal, event.direction = True, -1
     solution = solve_ivp(
@@ -83,7 +90,7 @@ def slide(state, force, slope, duration, side, valve, parameters):
         (0.0, duration),
         state,
         method="LSODA",
-        jac=lambda *_: np.array([[0.0, 1.0], [-spring / mass, -viscous / mass]]),
+        jac=None if falls_at else lambda *_: linear,
         events=(rest, stop) if math.isfinite(end_of_travel) else (rest,),
         dense_output=True,
         rtol=RTOL,
@@ -130,14 +137,37 @@ def integrate(valve, parameters, knots, pressure, times, position):
     return out
 
 
-@pytest.mark.parametrize("name", ["low", "high", "graphite"])
+FALLING = replace(GRAPHITE_PACKING, viscous_friction=9e4, stribeck_velocity=3.26e-3)
+PACKINGS = {
+    "low": (BENCH_VALVE, LOW_FRICTION),
+    "high": (BENCH_VALVE, HIGH_FRICTION),
+    "graphite": (GRAPHITE_VALVE, GRAPHITE_PACKING),
+    "stribeck": (GRAPHITE_VALVE, FALLING),
+    "both": (
+        GRAPHITE_VALVE,
+        replace(FALLING, coulomb_asymmetry=-0.05, viscous_asymmetry=-0.1),
+    ),
+    "asymmetric": (
+        GRAPHITE_VALVE,
+        replace(GRAPHITE_PACKING, coulomb_asymmetry=0.1, viscous_asymmetry=0.3),
+    ),
+}
+WAVES = {
+    "square": (SquareWave(), 20.8),
+    "triangle": (TriangleWave(period=30.0), 30.0),
+    "sine": (SineWave(), 35.5),
+}
+
+
 @pytest.mark.parametrize(
-    ("excitation", "duration"),
-    [(SquareWave(), 20.8), (TriangleWave(period=30.0), 30.0), (SineWave(), 35.5)],
-    ids=["square", "triangle", "sine"],
+    ("name", "wave"),
+    [
+        *product(("low", "high", "graphite"), WAVES),
+        *product(("stribeck", "both", "asymmetric"), ["square"]),
+    ],
 )
-def test_bench(benches, name, excitation, duration):
-    valve, parameters = benches[name]
+def test_bench(name, wave):
+    (valve, parameters), (excitation, duration) = PACKINGS[name], WAVES[wave]
     between = 100  # samples on each straight piece of the pressure
     knots = np.arange(0.0, duration + 1e-9, between * SAMPLE_PERIOD)
     pressure = converter_response(excitation.sample(knots), between * SAMPLE_PERIOD)
@@ -147,15 +177,17 @@ def test_bench(benches, name, excitation, duration):
         valve, parameters, knots, pressure, times, float(found.position[0])
     )
     assert np.ptp(position) > 0.4 * valve.travel
-    assert np.abs(found.position - position).max() < ASKED_POSITION
-    assert np.abs(found.position - position).max() < AGREED_POSITION
-    assert np.abs(found.velocity - velocity).max() < AGREED_VELOCITY
+    if parameters.stribeck_velocity:  # chords stand for friction that falls with the speed
+        assert np.abs(found.position - position).max() < BY_CHORDS
+    else:
+        assert np.abs(found.position - position).max() < AGREED_POSITION
+        assert np.abs(found.velocity - velocity).max() < AGREED_VELOCITY
 
 
 @pytest.mark.parametrize("name", ["low", "high", "graphite"])
-def test_kink_at_every_sample(benches, name):
+def test_kink_at_every_sample(name):
     """Noise of 1 kPa (45 N) on the way from one rest to the next."""
-    valve, parameters = benches[name]
+    valve, parameters = PACKINGS[name]
     times = np.arange(601) * SAMPLE_PERIOD
     noise = 1000.0 * np.random.default_rng(3).standard_normal(times.size)
     pressure = 1e5 + 3e4 * np.sin(4 * np.pi * times) + noise
@@ -169,81 +201,7 @@ def test_kink_at_every_sample(benches, name):
     assert np.abs(found.velocity - velocity).max() < AGREED_VELOCITY
 
 
-PERIOD = 1e-3
-TIME = np.arange(0, 21, PERIOD)
-PRESSURE = converter_response(SquareWave().sample(TIME), PERIOD)
-FALLING = replace(GRAPHITE_PACKING, viscous_friction=9e4, stribeck_velocity=3.26e-3)
-
-
-def independent(valve, parameters):
-    """The stem by phases: at rest until the pull exceeds F_s, then integrated until it stops."""
-
-    def acceleration(side):
-        def derivative(time, state):
-            position, velocity = state
-            speed = max(side * velocity, 1e-300)
-            force = np.interp(time, TIME, PRESSURE) - valve.pressure_reference
-            pull = (
-                force * valve.diaphragm_area
-                - parameters.spring_preload
-                - parameters.spring_constant * position
-            )
-            friction = float(parameters.sliding_friction(side * speed))
-            return [velocity, (pull - friction) / parameters.mass]
-
-        return derivative
-
-    def stops(_, state):
-        return state[1] * side
-
-    stops.terminal, stops.direction = True, -1
-    forces = valve.actuator_force(PRESSURE) - parameters.spring_preload
-    up = parameters.static_friction * (1 + parameters.coulomb_asymmetry)
-    down = parameters.static_friction * (1 - parameters.coulomb_asymmetry)
-    place = simulate(valve, parameters, PRESSURE[:1], PERIOD).position[0]
-    now, positions = 0.0, np.full(TIME.size, np.nan)
-    while now < TIME[-1]:
-        pull = forces - parameters.spring_constant * place
-        leaves = np.flatnonzero((now < TIME) & ((pull > up) | (pull < -down)))
-        if not leaves.size:
-            positions[now <= TIME] = place
-            break
-        index = leaves[0]
-        side, limit = (1, up) if pull[index] > up else (-1, down)
-        before, after = side * pull[index - 1], side * pull[index]
-        leaving = TIME[index - 1] + PERIOD * max(limit - before, 0.0) / (after - before)
-        leaving = max(leaving, now)
-        positions[(now <= TIME) & (leaving >= TIME)] = place
-        slide = solve_ivp(
-            acceleration(side),
-            (leaving, TIME[-1]),
-            [place, side * 1e-12],
-            method="Radau",
-            events=stops,
-            rtol=1e-8,
-            atol=1e-11,
-            max_step=5e-3,
-            dense_output=True,
-        )
-        during = (leaving < TIME) & (slide.t[-1] >= TIME)
-        positions[during] = slide.sol(TIME[during])[0]
-        place, now = slide.y[0, -1], slide.t[-1]
-    return positions
-
-
-@pytest.mark.parametrize(
-    "parameters",
-    [
-        FALLING,
-        replace(FALLING, coulomb_asymmetry=-0.05, viscous_asymmetry=-0.1),
-        replace(GRAPHITE_PACKING, coulomb_asymmetry=0.1, viscous_asymmetry=0.3),
-    ],
-    ids=["stribeck", "both", "asymmetric"],
-)
-def test_against_independent_integration(parameters):
-    """Within a tenth of the micrometre that the published model is held to."""
-    positions = simulate(GRAPHITE_VALVE, parameters, PRESSURE, PERIOD).position
-    assert np.abs(positions - independent(GRAPHITE_VALVE, parameters)).max() < 1e-7
+PRESSURE = converter_response(SquareWave().sample(np.arange(0, 21, SAMPLE_PERIOD)), SAMPLE_PERIOD)
 
 
 def test_friction_force_of_the_sliding_stem():
@@ -269,7 +227,7 @@ def test_slow_fall_is_plain_friction_at_the_static_level():
     endless = replace(GRAPHITE_PACKING, stribeck_velocity=1e3)
     level = replace(GRAPHITE_PACKING, coulomb_friction=GRAPHITE_PACKING.static_friction)
     falling, plain = (
-        simulate(GRAPHITE_VALVE, one, PRESSURE, PERIOD).position for one in (endless, level)
+        simulate(GRAPHITE_VALVE, one, PRESSURE, SAMPLE_PERIOD).position for one in (endless, level)
     )
     assert np.abs(falling - plain).max() < 1e-9
 
@@ -280,8 +238,8 @@ def test_mirrored_asymmetry_mirrors_the_motion():
     skewed = replace(FALLING, spring_preload=0.0, coulomb_asymmetry=0.2, viscous_asymmetry=0.1)
     mirrored = replace(skewed, coulomb_asymmetry=-0.2, viscous_asymmetry=-0.1)
     pressure = PRESSURE - PRESSURE.mean()
-    up = simulate(valve, skewed, pressure, PERIOD).position
-    down = simulate(valve, mirrored, -pressure, PERIOD).position
+    up = simulate(valve, skewed, pressure, SAMPLE_PERIOD).position
+    down = simulate(valve, mirrored, -pressure, SAMPLE_PERIOD).position
     assert np.abs(up + down).max() < 1e-15
 
 

@@ -49,11 +49,11 @@ def kernels(tmp_path):
     return tmp_path
 
 
-def run(folder, **variables):
-    """What the kernel `outer` answers in a new process, and whether it came out of the cache."""
+def told(folder, *words, **variables):
+    """What a new process of Python prints."""
     environment = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
     found = subprocess.run(
-        [sys.executable, "-B", "outer.py"],
+        [sys.executable, "-B", *words],
         cwd=folder,
         env=environment | variables,
         capture_output=True,
@@ -61,7 +61,12 @@ def run(folder, **variables):
         check=False,
     )
     assert found.returncode == 0, found.stderr
-    value, hits = map(int, found.stdout.split())
+    return found.stdout
+
+
+def run(folder, **variables):
+    """What the kernel `outer` answers in a new process, and whether it came out of the cache."""
+    value, hits = map(int, told(folder, "outer.py", **variables).split())
     return value, bool(hits)
 
 
@@ -81,10 +86,7 @@ def test_a_kernel_out_of_the_cache_serves_one_that_is_compiled(kernels):
     for part in (kernels / "__pycache__").glob("outer.*"):
         part.unlink()
     alone = "import sys, inner; print(inner.inner(), 'scipy.linalg' in sys.modules)"
-    answer = subprocess.run(
-        [sys.executable, "-B", "-c", alone], cwd=kernels, capture_output=True, text=True, check=True
-    )
-    assert answer.stdout.split() == ["4", "False"]
+    assert told(kernels, "-c", alone).split() == ["4", "False"]
     assert run(kernels) == (4, False)
     assert run(kernels) == (4, True)
 
@@ -96,17 +98,8 @@ def test_a_first_compilation_is_logged_once(kernels):
         "logging.basicConfig(level=logging.INFO, stream=sys.stdout, format='told: %(message)s')\n"
         "import outer\n"
     )
-    told = [
-        subprocess.run(
-            [sys.executable, "-B", "logged.py"],
-            cwd=kernels,
-            capture_output=True,
-            text=True,
-            check=True,
-        ).stdout.count("told: compiling numeric code")
-        for _ in range(2)
-    ]
-    assert told == [1, 0]
+    logged = [told(kernels, "logged.py").count("told: compiling") for _ in range(2)]
+    assert logged == [1, 0]
 
 
 def test_nowhere_to_cache(kernels):

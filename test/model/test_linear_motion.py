@@ -127,43 +127,19 @@ def test_motion_of_the_stiff_valve(time):
     acceleration = (force - p.spring_constant * position - p.viscous_friction * velocity) / p.mass
     jerk = slope / p.mass - p.spring_constant / p.mass * velocity
     damping, stiffness = p.viscous_friction / p.mass, p.spring_constant / p.mass
-    found = motion_after(
-        Motion(position, velocity, acceleration),
-        jerk,
-        impulse_response(damping, stiffness, time),
-        time,
-    )
-    system = np.array(
-        [
-            [0, 1, 0, 0],
-            [-stiffness, -damping, 1 / p.mass, 0],
-            [0, 0, 0, 1],
-            [0, 0, 0, 0],
-        ]
-    )
-    exponential = expm(system * time)
-    expected = exponential @ [position, velocity, force, slope]
-    tolerance = (
-        16
-        * EPS
-        * expm_cond(system * time)
-        * np.abs(exponential)
-        @ [
-            position,
-            velocity,
-            force,
-            slope,
-        ]
-    )
+    response = impulse_response(damping, stiffness, time)
+    found = motion_after(Motion(position, velocity, acceleration), jerk, response, time)
+    system = np.zeros((4, 4))
+    system[0, 1] = system[2, 3] = 1.0
+    system[1, :3] = -stiffness, -damping, 1 / p.mass
+    exponential, start = expm(system * time), [position, velocity, force, slope]
+    expected = exponential @ start
+    tolerance = 16 * EPS * expm_cond(system * time) * np.abs(exponential) @ start
     assert abs(found.position - expected[0]) <= tolerance[0]
     assert abs(found.velocity - expected[1]) <= tolerance[1]
     # (1) itself gives the acceleration; its terms are forces of up to 3 kN, over the mass.
-    balance = (
-        force
-        + slope * time
-        - p.spring_constant * found.position
-        - p.viscous_friction * found.velocity
-    ) / p.mass
+    drive, spring = force + slope * time, p.spring_constant * found.position
+    balance = (drive - spring - p.viscous_friction * found.velocity) / p.mass
     assert abs(found.acceleration - balance) <= 64 * EPS * force / p.mass
 
 

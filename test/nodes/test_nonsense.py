@@ -18,7 +18,7 @@ from live_nodes import STREAM, values_of
 from sensor_msgs.msg import FluidPressure, JointState
 from waiting import PATIENCE
 
-from benchmark.soak.feed import PERIOD, TOLD_WITHIN, Nonsense, said
+from benchmark.soak_plant import PERIOD, TOLD_WITHIN, Nonsense, said
 from valve_friction_ros.health import Baseline
 from valve_friction_ros.history import KeptBaseline, KeptValve
 

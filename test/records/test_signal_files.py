@@ -20,8 +20,7 @@ from hypothesis import given
 from hypothesis import strategies as some
 
 from benchmark.exports.programs import PROGRAMS, pi_pairs, twin_cat, twin_cat_semicolons
-from benchmark.exports.trial import read
-from benchmark.exports.truth import draw
+from benchmark.exports.truth import draw, read
 from valve_friction_ros.commands.main import run
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.model import BENCH_VALVE, LOW_FRICTION, SineWave, Valve, simulate

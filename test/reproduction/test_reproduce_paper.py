@@ -21,20 +21,9 @@ from valve_friction_ros.commands.main import run
 
 PICTURES = {
     "excitations",
-    "figure_1",
-    "figure_2",
     "figure_2_graphite",
-    "figure_3_low",
-    "figure_3_high",
-    "figure_3_graphite",
-    "figure_4_low",
-    "figure_4_high",
-    "figure_4_graphite",
-    "figure_5",
-    "figure_6",
-    "figure_7",
-    "figure_8",
-    "figure_9",
+    *(f"figure_{number}" for number in (1, 2, 5, 6, 7, 8, 9)),
+    *(f"figure_{number}_{name}" for number in (3, 4) for name in ("low", "high", "graphite")),
     "validation_graphite_sine",
     "validation_graphite_isa",
 }

@@ -11,30 +11,13 @@
 
 import math
 
-__all__ = ["KEYS", "PARAMETER_KEYS", "column", "known", "none_for_nan", "row_of", "values"]
-
 KEYS = {
-    "method",
-    "parameters",
-    "fit",
-    "rms",
-    "sliding_speed",
-    "systematic_misfit",
-    "model_describes",
-    "derivative_window",
-    "evidence",
-    "settings",
-    "warnings",
+    *("method", "parameters", "fit", "rms", "sliding_speed", "systematic_misfit", "warnings"),
+    *("model_describes", "derivative_window", "evidence", "settings"),
 }
 
 PARAMETER_KEYS = {
-    "value",
-    "standard_error",
-    "half_width",
-    "interval",
-    "verdict",
-    "reason",
-    "published",
+    *("value", "standard_error", "half_width", "interval", "verdict", "reason", "published"),
     "unit",
 }
 

@@ -50,6 +50,23 @@ def parameter(name, value, half_width=1.0, verdict=Verdict.IDENTIFIED, reason=""
     return Parameter(name, value, half_width / 2, half_width, verdict, reason)
 
 
+def _entry(time, valve, words, changes, *diagnosed):
+    """An entry of the bench method, with what is the same of a success and a refusal."""
+    return HistoryEntry(
+        **{
+            "time": time,
+            "valve": valve,
+            "span": None,
+            "method": "bench",
+            "diagnosis": Diagnosis(Level.OK, StatusSignal.GOOD, quoted(words), *diagnosed),
+            "limits": FrictionLimits(),
+            "baseline": None,
+            "settings": _SETTINGS,
+            **changes,
+        }
+    )
+
+
 def success(time=START, friction=150.0, half_width=3.0, valve=VALVE, **changes):
     """An identification of a Coulomb friction, and of a sliding friction where one is given.
 
@@ -65,63 +82,24 @@ def success(time=START, friction=150.0, half_width=3.0, valve=VALVE, **changes):
         changes["sliding_speed"] = slid.speed
     speed = changes.get("sliding_speed", math.nan)
     found = None if baseline is None else compared(frictions, speed, baseline)
-    return HistoryEntry(
-        **{
-            "time": time,
-            "valve": valve,
-            "span": Span(time - 60 * SECOND, time),
-            "method": "bench",
-            "diagnosis": Diagnosis(
-                Level.OK,
-                StatusSignal.GOOD,
-                quoted("friction normal: so"),
-                found and found.ratio,
-                friction_state(found.ratio, FrictionLimits()) if found else FrictionState.UNKNOWN,
-            ),
-            "limits": FrictionLimits(),
-            "baseline": None,
-            "settings": _SETTINGS,
-            "parameters": {
-                "mass": parameter("mass", 1.0, 0.0, Verdict.FIXED, "assumed"),
-                "coulomb_friction": one,
-                "static_friction": parameter(
-                    "static_friction", math.nan, math.nan, Verdict.NOT_IDENTIFIABLE, "no slip jump"
-                ),
-                **frictions,
-            },
-            "fit": Fit(0.99, 1e-5, 1e-6),
-            **changes,
-        }
-    )
+    state = friction_state(found.ratio, FrictionLimits()) if found else FrictionState.UNKNOWN
+    withheld = (math.nan, math.nan, Verdict.NOT_IDENTIFIABLE, "no slip jump")
+    parameters = {
+        "mass": parameter("mass", 1.0, 0.0, Verdict.FIXED, "assumed"),
+        "coulomb_friction": one,
+        "static_friction": parameter("static_friction", *withheld),
+        **frictions,
+    }
+    known = {"span": Span(time - 60 * SECOND, time), "parameters": parameters}
+    known |= {"fit": Fit(0.99, 1e-5, 1e-6), **changes}
+    return _entry(time, valve, "friction normal: so", known, found and found.ratio, state)
 
 
 def refused(time=START, reason="the stem does not move: move the valve", valve=VALVE, **changes):
-    return HistoryEntry(
-        **{
-            "time": time,
-            "valve": valve,
-            "span": None,
-            "method": "bench",
-            "diagnosis": Diagnosis(
-                Level.OK, StatusSignal.GOOD, quoted(f"no estimate: {reason}"), None
-            ),
-            "limits": FrictionLimits(),
-            "baseline": None,
-            "settings": _SETTINGS,
-            "refusal": reason,
-            **changes,
-        }
-    )
+    return _entry(time, valve, f"no estimate: {reason}", {"refusal": reason, **changes}, None)
 
 
-_OF_VERSION_5 = {
-    "valve",
-    "settings",
-    "identification",
-    "parameter",
-    "baseline",
-    "baseline_record",
-}
+_OF_VERSION_5 = {"valve", "settings", "identification", "parameter", "baseline", "baseline_record"}
 
 
 def select(history, query):

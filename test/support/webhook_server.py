@@ -59,18 +59,15 @@ def answer_slowly(handler):
             handler.wfile.write(b"x")
 
 
-def answer_for_ever(handler):
+def answer_for_ever(handler, start=b"HTTP/1.0 200 OK\r\n\r\n"):
     with contextlib.suppress(OSError):
-        handler.wfile.write(b"HTTP/1.0 200 OK\r\n\r\n")
+        handler.wfile.write(start)
         while not handler.server.released.is_set():
             handler.wfile.write(b"x" * 65536)
 
 
 def headers_for_ever(handler):
-    with contextlib.suppress(OSError):
-        handler.wfile.write(b"HTTP/1.0 200 OK\r\nX-Long: ")
-        while not handler.server.released.is_set():
-            handler.wfile.write(b"x" * 65536)
+    answer_for_ever(handler, b"HTTP/1.0 200 OK\r\nX-Long: ")
 
 
 def no_http(handler):

@@ -60,14 +60,8 @@ class Trajectory(NamedTuple):
         return StemState(float(self.position[-1]), float(self.velocity[-1]))
 
 
-class _Ways(NamedTuple):
-    """Dynamics of both directions of motion."""
-
-    upward: Dynamics
-    downward: Dynamics
-
-
-def _dynamics(valve: Valve, parameters: KarnoppParameters) -> _Ways:
+def _dynamics(valve: Valve, parameters: KarnoppParameters) -> tuple[Dynamics, Dynamics]:
+    """Return the dynamics of the upward and of the downward motion."""
     upward, downward = (
         Dynamics(
             mass=parameters.mass,
@@ -84,7 +78,7 @@ def _dynamics(valve: Valve, parameters: KarnoppParameters) -> _Ways:
             (-parameters.coulomb_asymmetry, -parameters.viscous_asymmetry),
         )
     )
-    return _Ways(upward, downward)
+    return upward, downward
 
 
 def balanced_state(valve: Valve, parameters: KarnoppParameters, drive: float) -> StemState:

@@ -7,12 +7,16 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The dashboard before 500 valves, in a real browser: python -m benchmark.load, or `make load`."""
+
+"""The dashboard before 500 valves, in a real browser: `make load`."""
 
 import argparse
+import contextlib
 import itertools
+import math
 import os
 import random
+import shutil
 import statistics
 import sys
 import time
@@ -22,42 +26,265 @@ from typing import NamedTuple
 from urllib.parse import quote
 
 import numpy as np
-from playwright.sync_api import Browser, Page
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from playwright.sync_api import Browser, BrowserContext, Error, Page, sync_playwright
+from rclpy.serialization import serialize_message
 
-from benchmark.harness.processes import running
+from benchmark.harness.processes import Process, free_port, module, parameters, running
 from benchmark.harness.rows import Row, at_most, judged, none, opened_console, rows_table, under
-from benchmark.harness.run import own_folder, quiet_domain
-from benchmark.load.plant import identifier_of
-from benchmark.load.stage import (
-    ALL_HEARD,
-    LIVE,
-    Stage,
-    Visit,
-    launched,
-    pages_of,
-    visit,
-    wait_on_page,
+from benchmark.harness.run import Participant, own_folder, quiet_domain
+from benchmark.load_plant import identifier_of, ratio_of, tag_of
+from valve_friction_ros.health import (
+    AlarmKind,
+    Baseline,
+    Condition,
+    Diagnosis,
+    FrictionLimits,
+    Level,
+    MonitorSettings,
+    StatusSignal,
+    compared,
 )
+from valve_friction_ros.history import HistoryEntry, HistoryFile, KeptValve, follow_alarms
+from valve_friction_ros.history.database import writing
+from valve_friction_ros.history.entry import Fit, Span, settings_text
+from valve_friction_ros.history.rows import insert_entry, valve_id
+from valve_friction_ros.identification import Parameter, Verdict
+from valve_friction_ros.model import BENCH_VALVE
+from valve_friction_ros.nodes.service_call import caller
+from valve_friction_ros.streams import DAY
+from valve_friction_ros.wording import quoted
 
-_LOOK = 10.0
+_EVERY = 7 * DAY
+_GROWN = Condition(Level.WARN, StatusSignal.MAINTENANCE_REQUIRED, "friction has grown")
+_SETTINGS = settings_text(MonitorSettings(BENCH_VALVE))
+
+
+def _parameter(name: str, value: float, share: float = 0.02) -> Parameter:
+    half_width = share * value
+    return Parameter(name, value, half_width / 2, half_width, Verdict.IDENTIFIED, "")
+
+
+def _entry(
+    valve: KeptValve, baseline: Baseline | None, friction: float, stamp: int
+) -> HistoryEntry:
+    parameters = {
+        "mass": Parameter("mass", 1.6, 0.0, 0.0, Verdict.FIXED, "assumed"),
+        "viscous_friction": _parameter("viscous_friction", 5300.0),
+        "coulomb_friction": _parameter("coulomb_friction", friction),
+        "spring_constant": _parameter("spring_constant", 2.05e5),
+        "spring_preload": _parameter("spring_preload", 231.0),
+    }
+    found = None if baseline is None else compared(parameters, math.nan, baseline)
+    words = "friction normal: the stem ignores reversals smaller than 9 % of its travel"
+    return HistoryEntry(
+        time=stamp,
+        valve=valve,
+        span=Span(stamp - 60_000_000_000, stamp),
+        method="plant",
+        diagnosis=Diagnosis(Level.OK, StatusSignal.GOOD, quoted(words), found and found.ratio),
+        limits=FrictionLimits(),
+        baseline=baseline,
+        settings=_SETTINGS,
+        parameters=parameters,
+        fit=Fit(0.99, 1e-5, 1e-6),
+    )
+
+
+def write_history(path: Path, valves: int, weeks: int = 52) -> None:
+    """Write a history file with weekly identifications and an alarm for each valve."""
+    now = time.time_ns()
+    with writing(path) as connection:
+        for index in range(valves):
+            chance = random.Random(index)
+            valve = KeptValve(identifier_of(index), tag_of(index))
+            number, healthy = valve_id(connection, valve), chance.uniform(150, 900)
+            ratio = ratio_of(index)
+            baseline = None if ratio is None else Baseline(healthy, 0.02 * healthy)
+            change = (ratio or 1.0) - 1
+            for week in range(weeks):
+                share = max(0.0, 2 * week / weeks - 1)
+                friction = healthy * (1 + change * share) * chance.gauss(1.0, 0.01)
+                stamp = now - (weeks - week) * _EVERY
+                insert_entry(connection, number, _entry(valve, baseline, friction, stamp))
+    for index in range(valves):
+        valve = KeptValve(identifier_of(index), tag_of(index))
+        follow_alarms(HistoryFile(path), valve, {AlarmKind.FRICTION_HIGH: _GROWN}, now)
+
+
+LIVE = "/live_1/identifier"
+"""The identifier of the real valve."""
+_RECORD = 14.0
+"""Length of its record, s: more than one period of the pressure."""
+_ANSWER = 600.0
+_PATIENCE = 60.0
+_FIRST_SCREEN = 40
+"""Number of rows on a tall screen."""
+ALL_HEARD = " && ".join(
+    f"document.querySelector('.vf-filter.vf-{one} .vf-count')?.innerText === '0'"
+    for one in ("silent", "unheard")
+)
+"""Whether a plant page shows all valves as heard."""
+_LOOK = """
+(() => {
+  const look = () => {
+    let ready = false;
+    try { ready = Boolean(window.did_handshake && (%s)); } catch (error) { ready = false; }
+    if (ready) window.__ready = performance.now(); else requestAnimationFrame(look);
+  };
+  requestAnimationFrame(look);
+})()"""
+"""Checks at each animation frame whether the page is ready: drawn and connected."""
+
+
+class Stage:
+    """Starts and keeps the processes; the folder contains history and logs."""
+
+    def __init__(self, folder: Path, valves: int, say: Callable[[str], None]) -> None:
+        self.folder, self.valves, self.say, self._port = folder, valves, say, free_port()
+        self.address = f"http://127.0.0.1:{self._port}"
+        self.processes: list[Process] = []
+        self._history = folder / "history.sqlite"
+        self._template = folder / "status.cdr"
+
+    def _start(self, name: str, *arguments: str) -> Process:
+        log = self.folder / f"{name.rpartition('.')[2]}_{len(self.processes) + 1}.log"
+        made = Process(module(name, *arguments), log)
+        self.processes.append(made)
+        return made
+
+    def _node(self, name: str, place: str, **given: object) -> Process:
+        words = ["--ros-args", "--log-level", "info", *(["-r", f"__ns:={place}"] if place else [])]
+        return self._start(f"valve_friction_ros.nodes.{name}", *words, *parameters(**given))
+
+    def identifier(self, tag: str) -> None:
+        """Start the identifier of the real valve with a tag."""
+        known = {"valve_tag": tag, "history_file": self._history, "window": 60.0}
+        self.live = self._node("identifier", "/live_1", **known)
+
+    def show(self) -> None:
+        """Start the dashboard, and wait until it can be opened."""
+        known = {"port": self._port, "history_file": self._history}
+        self.dashboard = self._node("dashboard", "", **known)
+        self.dashboard.wait_for("ready: open")
+
+    def plant(self, rate: float, *more: str) -> Process:
+        """Start the simulated valves, and wait until they publish."""
+        given = ("--valves", str(self.valves), "--rate", str(rate), *more)
+        made = self._start("benchmark.load_plant", str(self._template), *given)
+        made.wait_for("publishing")
+        return made
+
+    @contextlib.contextmanager
+    def shown(self, rate: float, *more: str) -> Iterator[Process]:
+        """Provide a plant shown by the dashboard."""
+        with self.plant(rate, *more) as plant:
+            self.show()
+            yield plant
+        self.dashboard.end()
+
+    def prepare(self) -> None:
+        """Write the history, and record a real status as template for the simulated valves."""
+        self.say(f"writing the history of {self.valves} valves")
+        write_history(self._history, self.valves)
+        self.say("identifying a simulated valve by real nodes")
+        self.identifier("LIVE-1")
+        self._node("simulator", "/live_1", position_noise=1e-5, noise_seed=1)
+        drive = {"excitation": "sine", "sample_rate": 100.0, "pressure_noise": 20.0}
+        self._node("pressure_source", "/live_1", **drive, noise_seed=2)
+        with caller(lambda: True) as client:
+            identifier = client.find(LIVE, _ANSWER)
+            time.sleep(_RECORD)
+            for service in ("identify", "set_baseline"):
+                answer = client.call(identifier, service, _ANSWER)
+                if answer is None or not answer.success:
+                    raise RuntimeError(f"{service}: {answer}")
+        self._template.write_bytes(_heard())
+
+
+def _heard() -> bytes:
+    """Return the next status of the real valve with a ratio, serialised."""
+    found: list[DiagnosticStatus] = []
+
+    def note(message: DiagnosticArray) -> None:
+        found.extend(
+            status
+            for status in message.status
+            if any(value.key == "friction_ratio" for value in status.values)
+        )
+
+    with Participant("listener") as listener:
+        listener.node.create_subscription(DiagnosticArray, "/diagnostics", note, 100)
+        if not listener.wait(lambda: bool(found), _ANSWER):
+            raise RuntimeError(f"{LIVE} says no ratio of its friction")
+    return serialize_message(found[-1])
+
+
+class Visit(NamedTuple):
+    """A page to measure: its path, and an expression that is true once it is complete."""
+
+    name: str
+    path: str
+    is_ready: str
+
+
+def pages_of(valves: int, identifier: str) -> tuple[Visit, ...]:
+    """Return the pages to visit for a plant of `valves` valves and for one identifier."""
+    node = quote(identifier)
+    valve = (
+        "document.querySelector('.vf-parameters') "
+        "&& document.querySelector('.vf-chart-trend canvas')"
+    )
+    compared = "document.querySelector('.vf-compared tbody')"
+    screen = min(valves, _FIRST_SCREEN)
+    plant = f"document.querySelectorAll('.vf-row, .vf-tile').length >= {screen}"
+    alarms = f"document.querySelectorAll('.vf-alarm-list tbody tr').length >= {screen}"
+    return (
+        Visit("plant, table", "/", plant),
+        Visit("plant, tiles", "/?view=tiles", plant),
+        Visit("valve", f"/valve?node={node}", valve),
+        Visit("compare", f"/compare?a={node}&b={node}", compared),
+        Visit("alarms", "/alarms", alarms),
+    )
+
+
+@contextlib.contextmanager
+def launched() -> Iterator[Callable[[], Browser]]:
+    """Provide a function that starts the system's Chromium."""
+    path = shutil.which("chromium") or shutil.which("chromium-browser")
+    if path is None:
+        raise RuntimeError("there is no Chromium: run `make browser`")
+    with sync_playwright() as engine:
+        yield lambda: engine.chromium.launch(executable_path=path, args=["--no-sandbox"])
+
+
+def visit(context: BrowserContext, address: str, one: Visit) -> tuple[float, Page]:
+    """Open a page in a new tab; return the time until it is ready, s, and the tab."""
+    page = context.new_page()
+    page.add_init_script(_LOOK % one.is_ready)
+    page.goto(address + one.path, wait_until="commit")
+    ready = page.wait_for_function("window.__ready", timeout=1e3 * _PATIENCE)
+    return float(ready.json_value()) / 1e3, page
+
+
+def wait_on_page(page: Page, expression: str) -> None:
+    """Wait until an expression is true, even across reloads."""
+    end = time.monotonic() + _PATIENCE
+    while time.monotonic() < end:
+        with contextlib.suppress(Error):  # the page is loading
+            if page.evaluate(f"Boolean({expression})"):
+                return
+        page.wait_for_timeout(20)
+    raise RuntimeError(f"not within {_PATIENCE:g} s: {expression}")
+
+
+_LOOK_EVERY = 10.0
 _SETTLED = 0.3
 """Share of the run after which all caches are filled."""
 _GROWTH = 10.0
 """Largest growth of steady memory after that, MB. Chosen: 5 % of the bound."""
 _TABS = 4
-_PATIENCE = 60_000.0
-"""Longest time for a page to connect, ms."""
-
-
-class _Look(NamedTuple):
-    """Resources of the dashboard at a time, s, and the number of pages opened so far."""
-
-    time: float
-    memory: float
-    threads: int
-    files: int
-    pages: int
-    heap: float
+_SEARCHES = ("q=12-fv", "show=error,warn", "ne=F&sort=-ratio", "view=tiles")
 
 
 def _heap(page: Page) -> float:
@@ -82,10 +309,11 @@ class _Visitor:
         self.pages = 0
 
     def _draw(self) -> Visit:
-        valve = LIVE if self._chance.random() < 0.3 else identifier_of(
-            self._chance.randrange(self._stage.valves)
-        )  # fmt: skip
-        return self._chance.choice(pages_of(self._stage.valves, valve)[1:] + _searches())
+        is_live = self._chance.random() < 0.3
+        valve = LIVE if is_live else identifier_of(self._chance.randrange(self._stage.valves))
+        drawn = "document.querySelector('.vf-row, .vf-tile')"
+        searches = tuple(Visit("search", f"/?{query}", drawn) for query in _SEARCHES)
+        return self._chance.choice(pages_of(self._stage.valves, valve)[1:] + searches)
 
     def turn(self) -> None:
         """Open a page in a new or an existing tab, reload a tab, or close one."""
@@ -98,7 +326,7 @@ class _Visitor:
             tab = self._chance.choice(self._tabs)
             tab.goto(self._stage.address + self._draw().path, wait_until="commit")
             # An evaluation on a page that is being left may never return.
-            tab.wait_for_function("window.did_handshake", polling=50, timeout=_PATIENCE)
+            tab.wait_for_function("window.did_handshake", polling=50, timeout=1e3 * _PATIENCE)
         elif chance < 0.85:
             self._chance.choice(self._tabs).reload(wait_until="commit")
         else:
@@ -111,31 +339,24 @@ class _Visitor:
         self._tabs.clear()
 
 
-def _searches() -> tuple[Visit, ...]:
-    drawn = "document.querySelector('.vf-row, .vf-tile')"
-    return tuple(
-        Visit("search", f"/?{query}", drawn)
-        for query in (f"q={quote('12-fv')}", "show=error,warn", "ne=F&sort=-ratio", "view=tiles")
-    )
-
-
 def _looks(
     browser: Browser, stage: Stage, seconds: float, seed: int, file: Path
-) -> Iterator[_Look]:
+) -> Iterator[tuple[float, ...]]:
+    """Yield time, memory, threads and files of the dashboard, pages opened so far, and the heap."""
     visitor = _Visitor(browser, stage, seed)
     with browser.new_context() as context, file.open("w", encoding="utf-8") as written:
         wall = visit(context, stage.address, pages_of(stage.valves, LIVE)[0])[1]
         begin = time.monotonic()
         for due in itertools.count(1):
-            while time.monotonic() < begin + due * _LOOK:
+            while time.monotonic() < begin + due * _LOOK_EVERY:
                 visitor.turn()
             now = stage.dashboard.usage()
-            held = (now.memory, now.threads, now.files, visitor.pages, _heap(wall))
-            look = _Look(now.time - begin, *held)
+            passed = now.time - begin
+            look = (passed, now.memory, now.threads, now.files, visitor.pages, _heap(wall))
             print(*look, sep=",", file=written, flush=True)
-            stage.say(f"{look.time:.0f} s: {look.pages} pages, {look.memory:.1f} MB")
+            stage.say(f"{passed:.0f} s: {visitor.pages} pages, {now.memory:.1f} MB")
             yield look
-            if look.time > seconds:
+            if passed > seconds:
                 break
         visitor.close()
 

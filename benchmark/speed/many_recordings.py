@@ -7,26 +7,22 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Many recordings on all cores: CSV files of 62.4 s at 1 kHz, read and identified.
 
-The result is wall-clock seconds per recording in steady state. The measurement begins after as many
-answers as there are processes, to exclude their start. Other work on the machine takes cores away
-from several processes but not from a single process. Processor seconds per recording show whether
-the processes disturb each other.
-"""
+"""Recordings identified by processes, and by the workers of a cluster."""
 
 import os
 import statistics
 import tempfile
 import time
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from benchmark.harness.rows import Row
-from benchmark.speed.measuring import Settings, noisy_record
+from benchmark.speed.offline import Settings, noisy_record
 from valve_friction_ros.fleet import (
     DeadWorker,
     Job,
@@ -35,6 +31,7 @@ from valve_friction_ros.fleet import (
     in_processes,
     usable_cores,
 )
+from valve_friction_ros.fleet.workers import Cluster, cluster_at, in_cluster
 from valve_friction_ros.identification import DEFAULT_METHOD, IdentificationSettings
 from valve_friction_ros.model import BENCH_VALVE, HIGH_FRICTION, SensorNoise
 from valve_friction_ros.records.recordings import ReadingOptions
@@ -104,8 +101,14 @@ def cost_of(answers: Iterable[tuple[Job, _Answer | DeadWorker]], processes: int)
     )
 
 
-def measure(settings: Settings) -> Iterator[Row]:
-    """Measure one process, and one process per core, in turn."""
+def fleet(settings: Settings) -> Iterator[Row]:
+    """Identify many recordings on all cores: CSV files of 62.4 s at 1 kHz, read and identified.
+
+    The result is wall-clock seconds per recording in steady state. The measurement begins after as
+    many answers as there are processes, to exclude their start. Other work on the machine takes
+    cores away from several processes but not from a single process. Processor seconds per recording
+    show whether the processes disturb each other.
+    """
     cores = usable_cores()
     costs: dict[int, list[Cost]] = {1: [], cores: []}
     with tempfile.TemporaryDirectory() as folder:
@@ -129,3 +132,54 @@ def measure(settings: Settings) -> Iterator[Row]:
     item = f"processor seconds a recording, {cores} processes"
     goal, met = f"at most 1/{_SHARE} of it", _SHARE * every.processor <= one.processor
     yield Row(item, every.processor, "s", one.processor, peer, goal, met)
+
+
+_WORKERS = (1, 2)
+_OVERHEAD, _GAIN = 1.15, 1.8
+
+
+@contextmanager
+def _cluster(workers: int) -> Iterator[Cluster]:
+    """Start a scheduler and single-threaded workers, and connect to the scheduler."""
+    from distributed import LocalCluster  # noqa: PLC0415 - an extra
+
+    with (
+        LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=None) as started,
+        cluster_at(started.scheduler_address) as cluster,
+    ):
+        cluster.compare()
+        yield cluster
+
+
+def cluster(settings: Settings) -> Iterator[Row]:
+    """Identify many recordings on the workers of a Dask cluster, beside processes of one machine.
+
+    Recordings and clock are the same as in `fleet`. This part needs the extra `cluster`, and as
+    many free cores as workers.
+    """
+    pool: dict[int, list[Cost]] = {count: [] for count in _WORKERS}
+    workers: dict[int, list[Cost]] = {count: [] for count in _WORKERS}
+    with tempfile.TemporaryDirectory() as folder:
+        paths = write_recordings(Path(folder))
+        for repeat in range(settings.repeats):
+            for count in _WORKERS:
+                settings.say(f"{count} processes and workers, {repeat + 1} of {settings.repeats}")
+                jobs = recordings(paths, count)
+                answers = in_processes(timed, jobs, count, lambda: False)
+                pool[count].append(cost_of(answers, count))
+                with _cluster(count) as cluster:
+                    found = in_cluster(cluster, timed, jobs, lambda: False)
+                    workers[count].append(cost_of(found, count))
+    walls = {
+        (name, count): statistics.median(one.wall for one in costs[count])
+        for name, costs in (("pool", pool), ("workers", workers))
+        for count in _WORKERS
+    }
+    for count in _WORKERS:
+        ours, peer = walls["workers", count], walls["pool", count]
+        item, goal = f"seconds a recording, {count} workers", f"at most {_OVERHEAD:g} times it"
+        name = f"{count} processes"
+        yield Row(item, ours, "s", peer, name, goal, ours <= _OVERHEAD * peer)
+    one, two = walls["workers", 1], walls["workers", 2]
+    goal = f"at least {_GAIN:g} times faster"
+    yield Row("two workers", two, "s", one, "one worker", goal, one >= _GAIN * two)

@@ -119,8 +119,7 @@ def _own(value: KeyValue, beat: int, size: float, ratio: float) -> str:
 
 
 def _diagnostics(status: DiagnosticStatus) -> bytes:
-    raw: bytes = serialize_message(DiagnosticArray(status=[status]))
-    return raw
+    return serialize_message(DiagnosticArray(status=[status]))
 
 
 def _due(count: int, rate: float) -> Iterator[tuple[int, int]]:

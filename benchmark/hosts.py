@@ -7,7 +7,8 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""A plant of many hosts, one of which dies and one is cut off: `make hosts`, as root."""
+
+"""A plant of many hosts on one machine, some of which die or are cut off: `make hosts`."""
 
 import argparse
 import contextlib
@@ -21,6 +22,7 @@ import sys
 import tempfile
 import threading
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -41,19 +43,6 @@ _OWN_SHARED_MEMORY = 'mount -t tmpfs tmpfs /dev/shm; exec "$@"'
 def _ip(*words: str) -> str:
     done = subprocess.run([_IP, *words], check=True, capture_output=True, text=True)
     return done.stdout
-
-
-class Traffic(NamedTuple):
-    """Traffic on the cable of a host: bytes and packets, sent and received by the host."""
-
-    sent: int
-    received: int
-    packets_sent: int
-    packets_received: int
-
-    def since(self, earlier: "Traffic") -> "Traffic":
-        """Return the traffic since then."""
-        return Traffic(*(now - then for now, then in zip(self, earlier, strict=True)))
 
 
 class Host:
@@ -100,12 +89,12 @@ class Host:
         """Plug the cable into the bridge, or unplug it."""
         _ip("link", "set", self._cable, "up" if is_in else "down")
 
-    def traffic(self) -> Traffic:
-        """Return the traffic on the cable so far."""
+    def traffic(self) -> Counter[str]:
+        """Return the bytes sent and received by the host so far, and the packets sent."""
         counters = Path(f"/sys/class/net/{self._cable}/statistics")
         # This end of the cable receives what the host sends.
-        names = ("rx_bytes", "tx_bytes", "rx_packets", "tx_packets")
-        return Traffic(*(int((counters / name).read_text()) for name in names))
+        names = {"sent": "rx_bytes", "received": "tx_bytes", "packets": "rx_packets"}
+        return Counter({key: int((counters / name).read_text()) for key, name in names.items()})
 
 
 @contextlib.contextmanager
@@ -148,36 +137,6 @@ class Group(NamedTuple):
     fewest: int = 0
 
 
-class Picture:
-    """The picture on the dashboard: its latest printed line, read in a thread."""
-
-    def __init__(self, process: Process) -> None:
-        self._process = process
-        self._groups: dict[str, Group] = {}
-        threading.Thread(target=self._read, daemon=True).start()
-
-    def _read(self) -> None:
-        for line in self._process.output:
-            found = json.loads(line)["groups"]
-            self._groups = {name: Group(**group) for name, group in found.items()}
-
-    def group(self, name: str) -> Group:
-        """Return the shown state of the valves of a host."""
-        return self._groups.get(name, Group())
-
-    def time_until(
-        self, is_met: Callable[[], bool], patience: float, begin: float | None = None
-    ) -> float:
-        """Wait for a condition; return the time since `begin` or now, s, or inf on timeout."""
-        begin = time.monotonic() if begin is None else begin
-        while not is_met():
-            if time.monotonic() - begin > patience:
-                return math.inf
-            self._process.require_running()
-            time.sleep(_LOOK)
-        return time.monotonic() - begin
-
-
 class Database:
     """A server outside the hosts, to which all send the history from their own files."""
 
@@ -210,13 +169,6 @@ class Database:
         yield Row("after", took, "s")
 
 
-@contextlib.contextmanager
-def _database() -> Iterator[Database | None]:
-    """Provide a new database on a new server, or None if no server can be started."""
-    with running_server(OUTSIDE) as server, tempfile.TemporaryDirectory() as folder:
-        yield None if server is None else Database(server, Path(folder))
-
-
 class _Running:
     """The processes on one host with valves."""
 
@@ -227,8 +179,8 @@ class _Running:
         valves = [f"{name}_{number}" for number in range(options.valves)]
         seconds = round(options.seconds + options.cut + 60.0)
         stream = ["--rate", str(options.rate), "--seconds", str(seconds)]
-        self.process = host.start_module("benchmark.hosts.host", *valves, *stream, *kept)
-        self._identifiers = int(self.process.output.readline())
+        self.process = host.start_module("benchmark.hosts_node", "serve", *valves, *stream, *kept)
+        self.identifiers = int(self.process.output.readline())
 
     def samples_sent(self) -> int:
         """Wait until the source has sent everything; return the samples of both signals."""
@@ -237,19 +189,12 @@ class _Running:
     def ask(self) -> int:
         """Identify some of its valves by a client on the host; return the number of answers."""
         valves = [f"{self.name}_{number}" for number in range(_ASKED)]
-        with self.host.start_module("benchmark.hosts.host", *valves, "--ask") as asker:
+        with self.host.start_module("benchmark.hosts_node", "ask", *valves) as asker:
             return int(asker.output.read() or 0)
-
-    def processor(self) -> float:
-        """Return the processor time of its identifiers, s."""
-        return processor_seconds(self._identifiers)
-
-    def megabytes(self) -> float:
-        return resident_megabytes(self._identifiers)
 
 
 class _Plant:
-    """The dashboard and the hosts, with their resource use and picture."""
+    """The dashboard and the hosts, and the picture on the dashboard: its latest printed line."""
 
     def __init__(
         self, hosts: Sequence[Host], options: argparse.Namespace, database: Database | None
@@ -258,8 +203,9 @@ class _Plant:
         self.office, self.database, self._options = office, database, options
         self.begin = time.monotonic()
         words = ("--ros-args", "-p", "history_file:=''")
-        self.dashboard = office.start_module("benchmark.hosts.dashboard", *words)
-        self.picture = Picture(self.dashboard)
+        self.dashboard = office.start_module("benchmark.hosts_node", "dashboard", *words)
+        self._groups: dict[str, Group] = {}
+        threading.Thread(target=self._read, daemon=True).start()
         self.hosts = [self.run(host, f"h{number}") for number, host in enumerate(others)]
         self.valves = options.valves * len(others)
 
@@ -267,21 +213,41 @@ class _Plant:
         kept = self.database.arguments(name) if self.database else []
         return _Running(host, name, self._options, kept)
 
+    def _read(self) -> None:
+        for line in self.dashboard.output:
+            found = json.loads(line)["groups"]
+            self._groups = {name: Group(**group) for name, group in found.items()}
+
+    def group(self, one: _Running) -> Group:
+        """Return the shown state of the valves of a host."""
+        return self._groups.get(one.name, Group())
+
+    def time_until(
+        self, is_met: Callable[[], bool], patience: float, begin: float | None = None
+    ) -> float:
+        """Wait for a condition; return the time since `begin` or now, s, or inf on timeout."""
+        begin = time.monotonic() if begin is None else begin
+        while not is_met():
+            if time.monotonic() - begin > patience:
+                return math.inf
+            self.dashboard.require_running()
+            time.sleep(_LOOK)
+        return time.monotonic() - begin
+
     def is_shown(self, one: _Running) -> bool:
         """Whether all valves of a host are shown, none of them silent."""
-        group = self.picture.group(one.name)
-        return (group.heard, group.silent) == (one.valves, 0)
+        return self.group(one)[:2] == (one.valves, 0)
 
     def is_silent(self, one: _Running) -> bool:
         """Whether all valves of a host are shown as silent."""
-        return self.picture.group(one.name).silent == one.valves
+        return self.group(one).silent == one.valves
 
     def is_complete(self) -> bool:
         return all(map(self.is_shown, self.hosts))
 
     def truth(self, item: str, is_met: Callable[[], bool]) -> Row:
         """Wait for a condition of the picture, with the goal `_TRUTH`."""
-        took = self.picture.time_until(is_met, _PATIENCE)
+        took = self.time_until(is_met, _PATIENCE)
         return Row(item, took, "s", goal=f"within {_TRUTH:g} s", met=took <= _TRUTH)
 
 
@@ -297,38 +263,29 @@ def _started(options: argparse.Namespace) -> Iterator[_Plant]:
             where = ("-l", hosts[0].address, "-p", str(_SERVER_PORT))
             stack.callback(hosts[0].start([executable, "-i", "0", *where]).kill)
             os.environ["ROS_DISCOVERY_SERVER"] = f"{hosts[0].address}:{_SERVER_PORT}"
-        yield _Plant(hosts, options, stack.enter_context(_database()))
+        server = stack.enter_context(running_server(OUTSIDE))
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+        yield _Plant(hosts, options, None if server is None else Database(server, folder))
 
 
-class _Use(NamedTuple):
-    """Total resource use up to a time."""
-
-    time: float
-    identifiers: float
-    dashboard: float
-    traffic: Traffic
-    office: Traffic
-
-
-def _used(plant: _Plant) -> _Use:
-    traffic = [one.host.traffic() for one in plant.hosts]
-    return _Use(
-        time.monotonic(),
-        sum(one.processor() for one in plant.hosts),
-        plant.dashboard.usage().processor,
-        Traffic(*map(sum, zip(*traffic, strict=True))),
-        plant.office.traffic(),
-    )
+def _used(plant: _Plant) -> Counter[str]:
+    """Return the total use so far: time and processor times, s, and traffic."""
+    used: Counter[str] = sum((one.host.traffic() for one in plant.hosts), Counter())
+    used["time"] = time.monotonic()
+    used["identifiers"] = sum(processor_seconds(one.identifiers) for one in plant.hosts)
+    used["dashboard"] = plant.dashboard.usage().processor
+    used["office"] = plant.office.traffic()["received"]
+    return used
 
 
 def _at_start(plant: _Plant) -> Iterator[Row]:
-    took = plant.picture.time_until(plant.is_complete, _START, plant.begin)
+    took = plant.time_until(plant.is_complete, _START, plant.begin)
     yield Row("start to the complete picture", took, "s", goal="shown", met=math.isfinite(took))
     used, count = _used(plant), plant.valves
-    yield Row("traffic until then, a valve", used.traffic.sent / count / 1e3, "kB")
-    spent = 1e3 * used.identifiers / count
+    yield Row("traffic until then, a valve", used["sent"] / count / 1e3, "kB")
+    spent = 1e3 * used["identifiers"] / count
     yield Row("processor time of the identifiers until then, a valve", spent, "ms")
-    yield Row("processor time of the dashboard until then", used.dashboard, "s")
+    yield Row("processor time of the dashboard until then", used["dashboard"], "s")
 
 
 def _in_service(plant: _Plant, seconds: float) -> Iterator[Row]:
@@ -336,17 +293,16 @@ def _in_service(plant: _Plant, seconds: float) -> Iterator[Row]:
     time.sleep(min(15.0, seconds / 2))  # the discovery ends
     before = _used(plant)
     time.sleep(seconds / 2)
-    after = _used(plant)
-    count, span = plant.valves, after.time - before.time
-    sent = after.traffic.since(before.traffic)
-    yield Row("a valve", 1e3 * (after.identifiers - before.identifiers) / span / count, "mcores")
-    yield Row("a valve", sum(one.megabytes() for one in plant.hosts) / count, "MB")
-    yield Row("a valve", sent.sent / span / count / 1e3, "kB/s")
-    yield Row("a valve", sent.packets_sent / span / count, "packets/s")
-    yield Row("dashboard", (after.dashboard - before.dashboard) / span, "cores")
+    used, count = _used(plant) - before, plant.valves
+    span = used["time"]
+    memory = sum(resident_megabytes(one.identifiers) for one in plant.hosts)
+    yield Row("a valve", 1e3 * used["identifiers"] / span / count, "mcores")
+    yield Row("a valve", memory / count, "MB")
+    yield Row("a valve", used["sent"] / span / count / 1e3, "kB/s")
+    yield Row("a valve", used["packets"] / span / count, "packets/s")
+    yield Row("dashboard", used["dashboard"] / span, "cores")
     yield Row("dashboard", plant.dashboard.usage().memory, "MB")
-    heard = after.office.since(before.office).received
-    yield Row("received by the dashboard's host", heard / span / 1e6, "MB/s")
+    yield Row("received by the dashboard's host", used["office"] / span / 1e6, "MB/s")
 
 
 def _death(plant: _Plant) -> Iterator[Row]:
@@ -363,7 +319,7 @@ def _death(plant: _Plant) -> Iterator[Row]:
     if database:
         words = "that died, and is back"
         yield from database.rows(dead.name, words, answered, _START, time.monotonic())
-    took, item = plant.picture.time_until(plant.is_complete, _START), "it returns: start to the"
+    took, item = plant.time_until(plant.is_complete, _START), "it returns: start to the"
     yield Row(f"{item} complete picture", took, "s", goal="shown", met=took < _START)
 
 
@@ -395,9 +351,9 @@ def _at_end(plant: _Plant) -> Iterator[Row]:
         sent = one.samples_sent()
 
         def held(one: _Running = one) -> int:
-            return plant.picture.group(one.name).fewest
+            return plant.group(one).fewest
 
-        plant.picture.time_until(lambda held=held, sent=sent: held() >= sent, 10.0)
+        plant.time_until(lambda held=held, sent=sent: held() >= sent, 10.0)
         item, share = f"samples held of those sent on {one.name}", 100 * held() / sent
         yield Row(item, share, "%", goal="all", met=held() == sent)
 

@@ -7,20 +7,40 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Hours of service of a valve, and the moves extracted from its samples."""
 
+"""The service of a valve, and what the evidence of its moves says."""
+
+import contextlib
 import math
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmark.reality.plants.parameters import constants
-from benchmark.service.kernel import SUMS, new_state, runner_of
-from benchmark.service.plants import Duty, Senses, ServiceValve, valve_of
-from valve_friction_ros.evidence import Move, MoveStream
+from benchmark.reality.plants import constants, stem_pull
+from benchmark.service_plants import (
+    SUMS,
+    Duty,
+    Senses,
+    ServiceValve,
+    new_state,
+    runner_of,
+    valve_of,
+)
+from valve_friction_ros.evidence import MOST_MOVES, Evidence, Move, MoveStream, evidence_of
+from valve_friction_ros.health import (
+    Baseline,
+    FrictionLimits,
+    Level,
+    Reference,
+    baseline_by_evidence,
+    diagnosis_by_evidence,
+    reference_by_evidence,
+)
+from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.streams import Arrivals
 
@@ -31,21 +51,13 @@ _ORIGIN = 1_700_000_000_000_000_000
 
 
 class Stretch(NamedTuple):
-    """Ten minutes of service.
+    """Ten minutes of service."""
 
-    Attributes
-    ----------
-    stamps : tuple of ndarray of int64
-        Times of pressure and position, ns.
-    pressure, position : ndarray of float
-        Measured values, Pa and m.
-    work, distance : float
-        ∫|F·dx| and ∫|dx| of the true motion, J and m.
-    """
-
-    stamps: tuple[NDArray[np.int64], NDArray[np.int64]]
+    stamps: tuple[NDArray[np.int64], NDArray[np.int64]]  # times of pressure and position, ns
+    # measured values, Pa and m
     pressure: NDArray[np.float64]
     position: NDArray[np.float64]
+    # ∫|F·dx| and ∫|dx| of the true motion, J and m
     work: float
     distance: float
 
@@ -96,17 +108,9 @@ def stretches(
 ) -> Iterator[Stretch]:
     """Simulate hours of service with random set points and noise; yield ten minutes at a time.
 
-    Parameters
-    ----------
-    friction : callable
-        Friction at an hour, over that of the plant.
-    offset : callable
-        Shift of the preload at an hour, N.
-    duty : callable
-        Set points at an hour.
-    spacing : float
-        Time, s, between the starts of successive stretches; in between the valve is shut off in its
-        present state.
+    `friction`, over that of the plant, `offset` of the preload, N, and `duty` depend on the hour.
+    `spacing` is the time, s, between the starts of successive stretches; in between the valve is
+    shut off in its present state.
     """
     random = np.random.default_rng([seed, 7])
     loop, senses, plant = valve.loop, valve.senses, valve.plant
@@ -174,16 +178,6 @@ class Task:
     course: str
 
 
-@dataclass(frozen=True)
-class Served:
-    """Ten minutes of service up to an hour: completed moves, ∫|F·dx| (J) and ∫|dx| (m)."""
-
-    hour: float
-    moves: tuple[Move, ...]
-    work: float
-    distance: float
-
-
 class Course:
     """Course of friction, preload and set points; only friction is a change to declare."""
 
@@ -242,21 +236,149 @@ def known_valve(valve: ServiceValve) -> Valve:
     return Valve(body.area, body.pressure_reference, body.travel)
 
 
-def served(task: Task) -> Iterator[Served]:
-    """Simulate the service of a task, and extract its moves."""
-    valve = valve_of(task.plant)
-    course, stream = Course(task, valve), MoveStream(known_valve(valve))
-    spacing = _QUIET if task.course == "weeks" else STRETCH
-    courses = course.friction, course.offset, course.duty
-    parts = stretches(valve, task.hours, task.seed, *courses, spacing)
-    for number, one in enumerate(parts):
-        hour = (number * spacing + STRETCH) / 3600.0
-        yield Served(hour, stream.take(_arrivals(one)), one.work, one.distance)
-
-
 def _arrivals(stretch: Stretch) -> Arrivals:
     stamps = np.concatenate(stretch.stamps)
     kinds = np.repeat(np.array([0, 1], np.uint8), [one.size for one in stretch.stamps])
     order = np.argsort(stamps, kind="stable")
     values = np.concatenate((stretch.pressure, stretch.position))
     return Arrivals(kinds[order], stamps[order], values[order])
+
+
+_BEGIN = 1_700_000_000
+_SAME = 3600e9
+"""Time of the first sample, s, and largest difference between two dates of the same change, ns."""
+
+
+@dataclass(frozen=True)
+class Number:
+    """A number from the moves of one hour, with its truth; nan if withheld."""
+
+    name: str
+    truth: float
+    value: float
+    half_width: float
+
+
+@dataclass
+class Told:
+    """The outcome of a task."""
+
+    task: Task  # the task
+    numbers: list[Number] = field(default_factory=list)  # numbers from single hours
+    # declared changes, and rises of the level against the baseline, before friction changed
+    changes: int = 0
+    alarms: int = 0
+    # hours from the change of friction to its declaration, and to the rise of the level; nan if it
+    # did not happen. For slow growth, hours after friction reached 1.5 times
+    declared: float = math.nan
+    alarmed: float = math.nan
+    # like `alarmed`, for a valve without a baseline, by the reference from its first moves
+    alarmed_by_reference: float = math.nan
+    dated: bool | None = None  # whether the true time of the change lies in its interval
+    late: list[Number] = field(default_factory=list)  # numbers from all evidence at the end
+
+
+def _truths(
+    evidence: Evidence, valve: ServiceValve, friction: float, sliding: float
+) -> Iterator[Number]:
+    static, spring = valve.plant.friction.static * friction, _stiffness(valve)
+    for name, truth in (
+        ("sliding_friction", sliding),
+        ("static_friction", static),
+        ("dead_band", (sliding + static) / spring),
+    ):
+        one = evidence.parameters[name]
+        yield Number(name, truth, one.value, one.half_width)
+
+
+def _stiffness(valve: ServiceValve) -> float:
+    """Return the mean stiffness over the range of the set points, N/m."""
+    numbers, travel = constants(valve.plant), valve.plant.body.travel
+    low, high = valve.duty.low * travel, valve.duty.high * travel
+    return float(stem_pull(numbers, low, 0.0) - stem_pull(numbers, high, 0.0)) / (high - low)
+
+
+class _Watched:
+    """The evidence of a valve, gathered like in an identifier, and its declarations."""
+
+    def __init__(self, task: Task, valve: Valve, course: Course) -> None:
+        self._valve, self._course = valve, course
+        self._limits = FrictionLimits()
+        self._ledger: deque[Move] = deque(maxlen=MOST_MOVES)
+        self._baseline: Baseline | None = None
+        self._has_tried = False
+        self._reference: Reference | None = None
+        self._known: list[int] = []
+        self._high: set[str] = set()
+        self.told = Told(task)
+        self.evidence = evidence_of([], valve)
+
+    def take(self, hour: float, moves: Iterable[Move]) -> None:
+        """Take the moves of the ten minutes before an hour."""
+        self._ledger.extend(moves)
+        self.evidence = evidence_of(list(self._ledger), self._valve)
+        self._reference = self._reference or reference_by_evidence(self.evidence)
+        if hour >= BEFORE and not self._has_tried:
+            self._has_tried = True
+            with contextlib.suppress(RefusalError):
+                self._baseline = baseline_by_evidence(self.evidence)
+        self._declare(hour)
+        self._alarm(hour)
+
+    def _declare(self, hour: float) -> None:
+        told, change = self.told, self.evidence.change
+        if change is None or any(abs(change.latest - one) < _SAME for one in self._known):
+            return
+        self._known.append(change.latest)
+        if not self._course.has_changed(hour):
+            told.changes += 1
+        elif math.isnan(told.declared):
+            told.declared = hour - self._course.reached
+
+    def _alarm(self, hour: float) -> None:
+        """Note the alarms with a baseline and without one."""
+        told = self.told
+        cases = (("alarmed", self._baseline, None), ("alarmed_by_reference", None, self._reference))
+        for name, baseline, reference in cases:
+            found = diagnosis_by_evidence(
+                self.evidence, self._valve, baseline, self._limits, reference
+            )
+            if found is None or found.level < Level.WARN:
+                self._high.discard(name)
+                continue
+            if not self._course.has_changed(hour):
+                told.alarms += name not in self._high
+            elif math.isnan(getattr(told, name)):
+                setattr(told, name, hour - self._course.reached)
+            self._high.add(name)
+
+
+def tried(task: Task) -> Told:
+    """Simulate the service of a task, and evaluate it every ten minutes."""
+    plant = valve_of(task.plant)
+    course, valve = Course(task, plant), known_valve(plant)
+    watched, stream = _Watched(task, valve, course), MoveStream(valve)
+    told = watched.told
+    spacing = _QUIET if task.course == "weeks" else STRETCH
+    courses = course.friction, course.offset, course.duty
+    parts = stretches(plant, task.hours, task.seed, *courses, spacing)
+    moves: list[Move] = []
+    work = distance = 0.0
+    for number, part in enumerate(parts):
+        hour, new = (number * spacing + STRETCH) / 3600.0, stream.take(_arrivals(part))
+        moves += new
+        watched.take(hour, new)
+        work, distance = work + part.work, distance + part.distance
+        if (number + 1) % PER_HOUR:
+            continue
+        scale = course.friction(hour - 1e-6)
+        if distance > 0:  # a resting stem has no sliding friction
+            truth = work / distance
+            if scale == course.friction(hour - 1.0):
+                told.numbers += _truths(evidence_of(moves, valve), plant, scale, truth)
+            told.late = list(_truths(watched.evidence, plant, scale, truth))
+        moves, work, distance = [], 0.0, 0.0
+    if task.course == "step" and (change := watched.evidence.change) is not None:
+        begin = _BEGIN + course.at * 3600
+        told.dated = change.earliest / 1e9 <= begin <= change.latest / 1e9
+    return told

@@ -7,25 +7,124 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The streams: an identifier as a process, fed over DDS.
 
-Costs are processor seconds of all threads of the process per second of streaming, given as cores. A
-stream has lost nothing if the identifier's buffer holds every published sample.
-"""
+"""What streams cost an identifier."""
 
+import os
 import statistics
+import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
 from typing import NamedTuple
 
 import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.client import Client
+from rclpy.task import Future
+from std_srvs.srv import Trigger
 
-from benchmark.harness.processes import Process, module
-from benchmark.harness.rows import Row, at_most
-from benchmark.speed.measuring import Settings
-from benchmark.speed.observer import Observer, fleet, identifier
+from benchmark.harness.processes import Process, module, parameters
+from benchmark.harness.rows import Row, at_most, under
+from benchmark.harness.run import Participant
+from benchmark.speed.offline import Settings
 from valve_friction_ros.model import BENCH_VALVE
 from valve_friction_ros.streams import RecordBuffer, rows_arrived
+
+PROFILE = "FASTRTPS_DEFAULT_PROFILES_FILE"
+_PATIENCE = 120.0
+_MEETING = 0.5
+"""Time, s, for a discovered service to discover its client too."""
+_SILENCE = 5.0
+"""Time without new samples, s, after which no more are expected."""
+
+
+def identifier(name: str, valve: str, window: float) -> Process:
+    """Start the identifier of a valve by its module name."""
+    given = parameters(history_file="''", window=f"{window:.1f}")
+    return Process(module(name, "--ros-args", "-r", f"__ns:=/{valve}", *given))
+
+
+def fleet(valves: Sequence[str], window: float) -> Process:
+    """Start the identifiers of several valves in one process, which has its own profile."""
+    given = parameters(history_file="''", window=f"{window:.1f}", valves=f"[{','.join(valves)}]")
+    others = {name: value for name, value in os.environ.items() if name != PROFILE}
+    command = module("valve_friction_ros.nodes.identifiers", "--ros-args", *given)
+    return Process(command, environment=others)
+
+
+class Observer(Participant):
+    """Listens to the diagnostics of identifiers, and calls their services.
+
+    Without listening, hundreds of valves do not slow it down.
+    """
+
+    def __init__(self, listens: bool = True) -> None:
+        super().__init__("observer", start_parameter_services=False)
+        self.buffered: dict[str, int] = {}
+        self.first_seen: dict[str, float] = {}
+        self._clients: dict[str, Client] = {}
+        if listens:
+            kind, topic = DiagnosticArray, "/diagnostics"
+            self.node.create_subscription(kind, topic, self._on_diagnostics, 1000)
+
+    def _on_diagnostics(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            valve = status.hardware_id
+            self.first_seen.setdefault(valve, time.monotonic())
+            values = {entry.key: entry.value for entry in status.values}
+            if "buffered_samples" in values:  # only if its process keeps up
+                self.buffered[valve] = int(values["buffered_samples"])
+
+    def wait_for(self, valves: Sequence[str], process: Process, buffered: int = 0) -> bool:
+        """Listen until all valves hold `buffered` samples or no more arrive; return whether all do.
+
+        The first diagnostics and the first samples may take longer.
+        """
+        most, end = 0, time.monotonic() + _PATIENCE
+        while time.monotonic() < end:
+            process.require_running()
+            self.spin(0.1)
+            if all(self.buffered.get(valve, -1) >= buffered for valve in valves):
+                return True
+            held = sum(self.buffered.values()) + len(self.buffered)
+            if held > most:
+                most, end = held, time.monotonic() + _SILENCE
+        return False
+
+    def wait_for_answer(self, valve: str) -> float:
+        """Call a valve's identifier until it answers; return the time of the answer, s."""
+        client = self.node.create_client(Trigger, f"/{valve}/identifier/clear")
+        end = time.monotonic() + _PATIENCE
+        while time.monotonic() < end:
+            # The answer is lost if the node has not discovered its client yet, so call again.
+            if client.service_is_ready() and self.answer(client.call_async(Trigger.Request()), 0.3):
+                return time.monotonic()
+            self.spin(0.02)
+        raise TimeoutError(f"/{valve}/identifier does not answer")
+
+    def meet(self, valve: str, service: str) -> Client:
+        """Discover a service of a valve, so that a later call includes no discovery time."""
+        name = f"/{valve}/identifier/{service}"
+        if name not in self._clients:
+            self._clients[name] = self.node.create_client(Trigger, name)
+            self._clients[name].wait_for_service(_PATIENCE)
+            self.spin(_MEETING)
+        return self._clients[name]
+
+    def ask(self, valve: str, service: str) -> Future:
+        """Call a service of a valve; return the future of its answer."""
+        return self.meet(valve, service).call_async(Trigger.Request())
+
+    def told(self, valve: str, service: str) -> Trigger.Response | None:
+        """Call a service of a valve and listen until it answers; return None without an answer."""
+        return self.answer(self.ask(valve, service), _PATIENCE)
+
+    def cost(self, process: Process, seconds: float) -> float:
+        """Listen for a while; return the cores used by a process meanwhile."""
+        before = process.usage()
+        self.spin(seconds)
+        return process.usage().cores_since(before)
+
 
 _OURS = "valve_friction_ros.nodes.identifier"
 _PEER = "benchmark.speed.typed_identifier"
@@ -203,8 +302,12 @@ def _memory(_: Settings) -> Iterator[Row]:
     yield Row("by which that varies", (max(full) - min(full)) / 1e6, "MB")
 
 
-def measure(settings: Settings) -> Iterable[Row]:
-    """Measure cost, loss, start and memory of the identifier's inputs."""
+def streams(settings: Settings) -> Iterator[Row]:
+    """Stream to an identifier as a process, fed over DDS.
+
+    Costs are processor seconds of all threads of the process per second of streaming, given as
+    cores. A stream has lost nothing if the identifier's buffer holds every published sample.
+    """
     parts = (
         _memory,
         _memory_of_a_node,
@@ -216,3 +319,61 @@ def measure(settings: Settings) -> Iterable[Row]:
     )
     for part in parts:
         yield from part(settings)
+
+
+_FEW, _MANY = 100, 500
+_RATE = 1000
+_IDENTIFIED = 5
+
+
+class _Found(NamedTuple):
+    outcome: Outcome
+    answer: float
+
+
+def _found(count: int, settings: Settings) -> _Found:
+    """Stream to the valves for longer than a window; call one valve while others identify."""
+    settings.say(f"{count} valves, 1 kHz in blocks of 100")
+    valves = [f"fv_{number}" for number in range(count)]
+    answers = [0.0]
+
+    def ask(_: Observer) -> None:
+        with Observer(listens=False) as client:
+            for valve in valves[:_IDENTIFIED]:
+                client.meet(valve, "identify")
+            client.told(valves[-1], "restore_baseline")
+            working = [client.ask(valve, "identify") for valve in valves[:_IDENTIFIED]]
+            while not all(one.done() for one in working):
+                begin = time.monotonic()
+                client.told(valves[-1], "restore_baseline")  # refused immediately
+                answers.append(time.monotonic() - begin)
+                client.spin(0.1)
+
+    seconds, blocks = settings.seconds + 50, ["--blocks"]
+    outcome = fed(lambda _: fleet(valves, 60.0), valves, _RATE, seconds, blocks, ask)
+    return _Found(outcome, max(answers))
+
+
+def _rows(few: _Found, many: _Found) -> Iterable[Row]:
+    times, peer = _MANY // _FEW, f"{_MANY // _FEW} × {_FEW} valves"
+    (one, _), (all_of, answer) = few, many
+    cpu = all_of.cpu_to_start
+    yield at_most("start to the last diagnostic", all_of.seconds_to_start, "s", 8)
+    yield Row("processor time until then", cpu, "CPU s", times * one.cpu_to_start, peer)
+    memory, few_of = all_of.megabytes, times * one.megabytes
+    yield under("memory, windows of 60 s", memory, "MB", 1500, few_of, peer)
+    busy, goal = all_of.busy, "under one core"
+    yield Row("1 kHz in blocks of 100", busy, "cores", times * one.busy, peer, goal, busy < 1)
+    yield Row("no stream", all_of.idle, "cores", times * one.idle, peer)
+    item = "longest answer while others identify"
+    yield under(item, answer, "s", 1, few.answer, f"{_FEW} valves")
+
+
+def many_valves(settings: Settings) -> Iterator[Row]:
+    """Start hundreds of valves in one process: start, memory, cost and answers.
+
+    The peer of 500 valves is five times the cost of 100 valves, so a ratio below one means
+    disproportionate growth.
+    """
+    few, many = (_found(count, settings) for count in (_FEW, _MANY))
+    return _rows(few, many)
