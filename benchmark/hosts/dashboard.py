@@ -21,7 +21,7 @@ from collections import defaultdict
 
 import rclpy
 
-from valve_friction_ros.nodes.dashboard.node import Dashboard
+from valve_friction_ros.nodes.dashboard import Dashboard
 from valve_friction_ros.nodes.plumbing.polled_node import TurnExecutor
 from valve_friction_ros.nodes.plumbing.running import StopRequest
 

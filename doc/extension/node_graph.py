@@ -53,7 +53,7 @@ def _running(node: str) -> Iterator[object]:
 
     from valve_friction_ros.alerts import AlertSender
     from valve_friction_ros.health import DigestDesk
-    from valve_friction_ros.nodes.dashboard.node import Dashboard
+    from valve_friction_ros.nodes.dashboard import Dashboard
     from valve_friction_ros.nodes.identifier.node import Identifier
     from valve_friction_ros.nodes.identifier.workers import HistoryThread, Workers
     from valve_friction_ros.nodes.plumbing.processes import ThisProcess

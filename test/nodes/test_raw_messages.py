@@ -21,7 +21,7 @@ from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import FluidPressure, JointState
 from std_msgs.msg import Header
 
-from valve_friction_ros.nodes.dashboard.node import status_of, statuses_in
+from valve_friction_ros.nodes.dashboard import status_of, statuses_in
 from valve_friction_ros.nodes.plumbing import messages
 from valve_friction_ros.nodes.plumbing.messages import (
     arrivals_of,

@@ -354,7 +354,7 @@ import sys
 import numpy as np
 from valve_friction_ros.history.trend import fit_line
 import valve_friction_ros.dashboard.charts
-import valve_friction_ros.nodes.dashboard.node
+import valve_friction_ros.nodes.dashboard
 
 days = np.arange(9.0)
 fit_line(days, 1.0 + 0.1 * days + 0.01 * np.cos(9 * days), np.full(9, 0.001)).half_width(3.0)

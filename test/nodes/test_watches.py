@@ -26,8 +26,8 @@ from valve_friction_ros.dashboard.live_state import Sources
 from valve_friction_ros.health import FrictionMonitor, MonitorSettings
 from valve_friction_ros.history import HistoryError, KeptValve
 from valve_friction_ros.model import BENCH_VALVE
-from valve_friction_ros.nodes.dashboard import node
-from valve_friction_ros.nodes.dashboard.node import WatchedSignals
+from valve_friction_ros.nodes import dashboard
+from valve_friction_ros.nodes.dashboard import WatchedSignals
 from valve_friction_ros.nodes.identifier import response_watch, workers
 from valve_friction_ros.nodes.identifier.history_writer import WaitingChanges
 from valve_friction_ros.nodes.identifier.usage_watch import UsageWatch
@@ -87,7 +87,7 @@ class Subscription:
 
 @pytest.fixture
 def subscriptions(monkeypatch):
-    monkeypatch.setattr(node, "PolledSubscription", Subscription)
+    monkeypatch.setattr(dashboard, "PolledSubscription", Subscription)
 
 
 @pytest.mark.usefixtures("subscriptions")

@@ -454,7 +454,7 @@ def _serve(node: Dashboard, limited: contextlib.ExitStack) -> int:
     try:
         from valve_friction_ros.dashboard.pages import server  # noqa: PLC0415
     except ModuleNotFoundError as error:
-        if error.name and error.name.split(".")[0] == __name__.split(".", maxsplit=1)[0]:
+        if error.name and error.name.startswith("valve_friction_ros."):
             raise
         print(_MISSING, file=sys.stderr)  # noqa: T201
         return 2
@@ -488,4 +488,6 @@ def _serve(node: Dashboard, limited: contextlib.ExitStack) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    from valve_friction_ros.nodes.start import dashboard
+
+    sys.exit(dashboard())
