@@ -93,7 +93,7 @@ class AlarmBoard:
     ) -> None:
         self._node, self._monitor, self._history = node, monitor, history
         self._evidence = evidence
-        self._alarms: dict[AlarmKind, Alarm] = history.alarms()
+        self._alarms = history.look_up(database.read_alarms) or {}
         moves = evidence.evidence
         self._hold = FrictionHold(
             {side: self._condition(kind) for side, kind in ALARM_OF_SIDE.items()},
@@ -243,8 +243,7 @@ class AlarmBoard:
         time = self._node.get_clock().now().nanoseconds
         valve, days = self._history.valve, self._days
         step = _Step(lambda file: database.request_alarms(file, valve, kind, request, time, days))
-        if self._history.path is not None:
-            await self._history.keep_step(step)
+        await self._history.keep_change(step)
         if step.refusal is not None:
             raise step.refusal
         if step.made is None:  # not stored, or not yet

@@ -38,7 +38,6 @@ from valve_friction_ros.health import (
     FrictionMonitor,
     Level,
     MonitorSettings,
-    Reference,
     baseline_by_evidence,
     diagnosis_by_evidence,
     qualified,
@@ -91,12 +90,13 @@ class MoveLedger:
 
     def __init__(self, node: Node, history: HistoryWriter, built: Valve) -> None:
         self._node, self._history, self._built = node, history, built
-        self._moves: deque[Move] = deque(history.moves()[-MOST_MOVES:], maxlen=MOST_MOVES)
+        moves = history.look_up(database.read_moves, built) or ()
+        self._moves = deque(moves, maxlen=MOST_MOVES)
         self._unwritten: deque[Move] = deque(maxlen=MOST_MOVES)
         self._batch: _Batch | None = None
         self._written_at = time.monotonic()
-        self.reference: Reference | None = history.reference()
-        self.change: FrictionChange | None = history.change()
+        self.reference = history.look_up(database.read_reference, built)
+        self.change = history.look_up(database.read_change, built)
         self.left_out = 0
         self._left_in_a_row = 0
         self._problem = ""

@@ -104,7 +104,8 @@ class ResponseWatch:
         self._monitor: ResponseMonitor | None = None
         self._travel = math.nan
         self._written_at = monotonic()
-        if earlier := history.answers():
+        travel = monitor.settings.valve.travel
+        if earlier := history.look_up(database.read_answers, travel):
             self._begin(earlier)
         self._trouble = _CommandTrouble()
         self._standing = self._wrong = ""
