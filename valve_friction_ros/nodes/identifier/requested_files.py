@@ -12,6 +12,7 @@
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
 from rclpy.node import Node
 
@@ -23,7 +24,7 @@ from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
 from valve_friction_ros.nodes.identifier.response_watch import ResponseWatch
 from valve_friction_ros.nodes.identifier.usage_watch import UsageWatch
 from valve_friction_ros.nodes.plumbing.output_folder import OutputFolder, free_path
-from valve_friction_ros.nodes.plumbing.processes import ThisProcess, give_back_memory, imported
+from valve_friction_ros.nodes.plumbing.processes import give_back_memory, imported
 from valve_friction_ros.records.bags.topics import StreamNames, bag_libraries
 from valve_friction_ros.settings import IDENTIFICATION
 from valve_friction_ros.streams import Snapshot, utc
@@ -91,7 +92,7 @@ class ReportWriter:
         history: HistoryWriter,
         usage: UsageWatch,
         response: ResponseWatch,
-        apart: ThisProcess,
+        apart: Callable[..., Any],
     ) -> None:
         self._node, self._apart = node, apart
         self._monitor, self._history = monitor, history
@@ -153,7 +154,7 @@ class ReportWriter:
             told = facts | {"history": before, "notes": (*notes, *unread)}
             # Imported late, because its libraries cost memory, and most nodes never report.
             room = "valve_friction_ros.reports"
-            self._apart.done(imported, room, "write_identification_report", path, told)
+            self._apart(imported, room, "write_identification_report", path, told)
             give_back_memory()
 
         return write
