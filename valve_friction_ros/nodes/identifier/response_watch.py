@@ -239,7 +239,7 @@ class ResponseWatch:
 
     def _follow_publishers(self) -> None:
         """Adapt the quality of service; forget a command that is no longer published."""
-        silence = self._polled.watch.silence()
+        silence = self._polled.silence()
         if silence > _SILENCE:
             self._polled.follow_publishers()
         is_silent = silence > self._value("input_timeout")
