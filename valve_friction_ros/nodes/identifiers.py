@@ -105,7 +105,7 @@ def _identifiers_of_valves(
     places = _places(host.get_parameter("valves").value)
     processes = host.get_parameter("identification_processes").value
     workers = opened.enter_context(running_workers(processes))
-    declare_parameters(host, [replace(services, default=len(places) <= _FEW)])
+    declare_parameters(host, [replace(services, initial=len(places) <= _FEW)])
     context, faults = host.context, dict[str, str]()
     for number, place in enumerate(places):
         if number and number % _TOGETHER == 0:

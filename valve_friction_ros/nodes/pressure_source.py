@@ -33,7 +33,7 @@ from valve_friction_ros.nodes.plumbing.messages import time_message
 from valve_friction_ros.nodes.plumbing.parameters import declare_parameters, values_of
 from valve_friction_ros.nodes.plumbing.polled_node import PacedNode
 from valve_friction_ros.nodes.plumbing.qos import qos_overrides, stream
-from valve_friction_ros.nodes.plumbing.running import run_node
+from valve_friction_ros.nodes.plumbing.running import run_nodes
 from valve_friction_ros.records.table import read_columns
 from valve_friction_ros.settings import NODES
 
@@ -190,7 +190,7 @@ class PressureSource(PacedNode):
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the node."""
-    return run_node(PressureSource, arguments)
+    return run_nodes(lambda: [PressureSource()], arguments)
 
 
 if __name__ == "__main__":

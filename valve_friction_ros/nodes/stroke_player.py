@@ -28,7 +28,7 @@ from valve_friction_ros.nodes.plumbing.parameters import declare_parameters, val
 from valve_friction_ros.nodes.plumbing.polled_node import PacedNode, create_trigger_service
 from valve_friction_ros.nodes.plumbing.polled_subscription import PolledSubscription
 from valve_friction_ros.nodes.plumbing.qos import LATCHED, stream
-from valve_friction_ros.nodes.plumbing.running import run_node
+from valve_friction_ros.nodes.plumbing.running import run_nodes
 from valve_friction_ros.nodes.pressure_source import pressure_from_file
 from valve_friction_ros.planning.played_test import Abort, PlayedTest, PlayLimits, PlayPhase
 from valve_friction_ros.settings import NODES
@@ -146,7 +146,7 @@ class StrokePlayer(PacedNode):
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the node."""
-    return run_node(StrokePlayer, arguments)
+    return run_nodes(lambda: [StrokePlayer()], arguments)
 
 
 if __name__ == "__main__":

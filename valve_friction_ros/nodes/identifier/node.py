@@ -70,7 +70,7 @@ from valve_friction_ros.nodes.plumbing.parameters import (
     warn_of_columns,
 )
 from valve_friction_ros.nodes.plumbing.polled_node import create_trigger_service
-from valve_friction_ros.nodes.plumbing.running import run_node
+from valve_friction_ros.nodes.plumbing.running import run_nodes
 from valve_friction_ros.nodes.plumbing.worker import InternalError, Readiness
 from valve_friction_ros.settings import (
     IDENTIFICATION,
@@ -558,7 +558,7 @@ class Identifier(ManagedNode):
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the node."""
     with running_workers(_PROCESSES) as workers:
-        return run_node(lambda: Identifier(workers), arguments)
+        return run_nodes(lambda: [Identifier(workers)], arguments)
 
 
 if __name__ == "__main__":
