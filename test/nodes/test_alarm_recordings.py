@@ -20,7 +20,7 @@ import pytest
 from faulty_identifier import faulty
 from histories import START as DAWN
 from histories import VALVE, success
-from live_nodes import NAMESPACE, PROJECT, SECOND, START, values_of
+from live_nodes import ERROR, NODE, PROJECT, SECOND, START, values_of
 from records import quick_record
 from rosbags.rosbag2 import Reader
 
@@ -35,8 +35,6 @@ from valve_friction_ros.history import (
 from valve_friction_ros.model import BENCH_VALVE, HIGH_FRICTION
 from valve_friction_ros.nodes.identifier.alarm_recorder import _LATE
 
-NODE = f"{NAMESPACE}/identifier"
-ERROR = b"\x02"
 TICK = 1.0
 """Period of the diagnostics, s."""
 HEALTHY, TIGHT = quick_record(), quick_record(HIGH_FRICTION)
@@ -46,8 +44,7 @@ FAST = {"method": "bench", "alarm_recording": 0.1, "alarm_pause": 0.0}
 def baseline_set(live, parameters, script=None):
     """Start a node with the healthy valve as its baseline."""
     node = live.start_identifier({**FAST, **parameters}, script=script)
-    live.client.identified(HEALTHY)
-    assert live.client.trigger("set_baseline").success
+    live.client.set_baseline(HEALTHY)
     return node
 
 
@@ -213,8 +210,7 @@ def test_it_is_named_after_a_restart(live, tmp_path):
     values = values_of(status)
     assert values["alarm_recording"] == str(one.path)
     assert values["alarm_recording [time]"] == "2026-09-21T14:13:20Z"
-    live.client.send_record(TIGHT)
-    live.client.wait_for_buffered(2 * len(TIGHT))
+    live.client.fill(TIGHT)
     live.client.next_status()
     assert alarm_recordings(history, NODE) == (one,)
     assert not (tmp_path / "valve_friction_ros" / "alarms").exists()

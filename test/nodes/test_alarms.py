@@ -16,7 +16,7 @@ import time
 
 import pytest
 from histories import DAY, OTHER, START, VALVE, success
-from live_nodes import NAMESPACE, values_of
+from live_nodes import ERROR, NODE, OK, WARN, values_of
 from records import quick_record
 from std_msgs.msg import Float64
 from std_srvs.srv import SetBool
@@ -36,9 +36,6 @@ from valve_friction_ros.identification import identify
 from valve_friction_ros.model import BENCH_VALVE, HIGH_FRICTION
 from valve_friction_ros.settings import ALARM_KINDS
 
-NODE = f"{NAMESPACE}/identifier"
-OK, WARN, ERROR = b"\x00", b"\x01", b"\x02"
-PATIENT = {"input_timeout": 600.0}
 TAKEN = " (by the identification of 2023-11-14 22:13 UTC)"
 """What `~/set_baseline` says it took: the stamps of the tests begin at 1.7e9 s."""
 HEALTHY, TIGHT = quick_record(), quick_record(HIGH_FRICTION)
@@ -59,16 +56,15 @@ AGE = re.compile(r" \(identified \d+ (s|min) ago, before the restart\)")
 
 
 def test_an_alarm_outlives_a_kill(live):
-    node = live.start_identifier(PATIENT)
+    node = live.start_identifier()
     client = live.client
-    client.identified(HEALTHY)
-    assert client.trigger("set_baseline").success
+    client.set_baseline(HEALTHY)
     client.identified(TIGHT)
     before = client.statuses[-1][1]
     assert before.level == ERROR
     live.kill(node)
 
-    node = live.start_identifier(PATIENT)
+    node = live.start_identifier()
     after = client.next_status()
     assert after.level == ERROR
     (line,) = (one for one in node.errors.splitlines() if "baseline coulomb friction 152.7" in one)
@@ -115,7 +111,7 @@ def test_an_age_of_days(live, history):
     now = live.client.node.get_clock().now().nanoseconds
     history.add(success(now - 5 * DAY - DAY // 2, 400.0, baseline=None))
     history.set_baseline(VALVE, KeptBaseline(Baseline(100.0, 1.0), START, START))
-    node = live.start_identifier(PATIENT)
+    node = live.start_identifier()
     status = live.client.next_status()
     assert status.level == ERROR
     assert status.message.startswith("excess friction: coulomb friction is 4.00 (")
@@ -132,7 +128,7 @@ def test_stamps_of_a_time_to_come(live, history, tmp_path):
     for place, stamp in enumerate((now + DAY, now - DAY)):
         one = AlarmRecording(stamp, Level.WARN, tmp_path / f"{place}", "excess friction")
         keep_alarm_recording(history, VALVE, one, days=365.0)
-    live.start_identifier(PATIENT)
+    live.start_identifier()
     client = live.client
     status = client.next_status()
     assert status.level == ERROR
@@ -142,17 +138,16 @@ def test_stamps_of_a_time_to_come(live, history, tmp_path):
     assert values_of(status)["alarm_recording"] == str(tmp_path / "1")
     client.identified(HEALTHY)
     live.kill(live.nodes[-1])
-    live.start_identifier(PATIENT)
+    live.start_identifier()
     status = client.next_status(lambda one: one.level != ERROR, "the newest result")
     assert AGE.search(status.message)
 
 
 @pytest.mark.parametrize("gone", ["removed", "replaced"])
 def test_a_history_that_goes_while_the_node_runs_costs_no_baseline(live, history, gone):
-    node = live.start_identifier(PATIENT)
+    node = live.start_identifier()
     client = live.client
-    client.identified(HEALTHY)
-    assert client.trigger("set_baseline").success
+    client.set_baseline(HEALTHY)
     kept = history.baseline(VALVE.name)
     if gone == "removed":
         for one in history.path.parent.glob("history.sqlite*"):
@@ -167,14 +162,14 @@ def test_a_history_that_goes_while_the_node_runs_costs_no_baseline(live, history
     again = history.baseline(VALVE.name)
     assert (again.baseline, again.time) == (kept.baseline, kept.time)
     live.kill(node)
-    live.start_identifier(PATIENT)
+    live.start_identifier()
     assert client.next_status().level == ERROR
 
 
 def test_two_nodes_of_one_valve_are_told(live):
-    live.start_identifier(PATIENT)
+    live.start_identifier()
     first = live.nodes[-1]
-    live.start_identifier(PATIENT)
+    live.start_identifier()
     told = "another node writes the history of /fv_101/identifier"
     status = live.client.next_status(lambda one: told in one.message, "the second node")
     assert status.level == WARN
@@ -195,7 +190,7 @@ def test_rows_that_cannot_be_read_stop_no_node(live, history, damage):
     connection = sqlite3.connect(history.path)
     connection.executescript(f"PRAGMA ignore_check_constraints = ON; UPDATE {damage}")
     connection.close()
-    live.start_identifier(PATIENT)
+    live.start_identifier()
     status = live.client.next_status()
     assert status.level == WARN
     assert f"{history.path}: a row holds no result: " in status.message
@@ -203,7 +198,7 @@ def test_rows_that_cannot_be_read_stop_no_node(live, history, damage):
 
 
 def test_a_node_without_a_history_says_so_and_keeps_nothing(live, history):
-    live.start_identifier({**PATIENT, "history_file": "''"})
+    live.start_identifier({"history_file": "''"})
     client = live.client
     told = client.status_values()["history"]
     assert told == (
@@ -219,7 +214,7 @@ def test_a_node_without_a_history_says_so_and_keeps_nothing(live, history):
 
 
 def test_the_baseline_is_guarded_and_restored(live, history):
-    node = live.start_identifier(PATIENT)
+    node = live.start_identifier()
     client = live.client
     nothing = client.trigger("restore_baseline")
     assert not nothing.success
@@ -244,7 +239,7 @@ def test_the_baseline_is_guarded_and_restored(live, history):
     assert client.next_status().level == OK
     live.kill(node)
 
-    live.start_identifier(PATIENT)  # by its default again
+    live.start_identifier()  # by its default again
     assert client.next_status().level == OK
     answer = client.trigger("restore_baseline")
     assert answer.success
@@ -267,7 +262,7 @@ def test_the_baseline_is_guarded_and_restored(live, history):
 
 
 def test_a_baseline_of_the_parameter_is_replaced_and_comes_back(live, history):
-    live.start_identifier({**PATIENT, "baseline_coulomb_friction": 140.0})
+    live.start_identifier({"baseline_coulomb_friction": 140.0})
     client = live.client
     client.identified(HEALTHY)
     given = Baseline(140.0)

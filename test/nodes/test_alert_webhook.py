@@ -12,7 +12,7 @@
 import time
 
 import pytest
-from live_nodes import NAMESPACE, values_of
+from live_nodes import ERROR, NODE, OK, WARN, values_of
 from records import quick_record
 from webhook_server import Receiver, answer_never, answer_with, self_signed
 
@@ -23,8 +23,6 @@ from valve_friction_ros.identification import identify
 from valve_friction_ros.model import BENCH_VALVE, HIGH_FRICTION
 from valve_friction_ros.usage import BINS, Usage, UsedDay
 
-NODE = f"{NAMESPACE}/identifier"
-OK, WARN, ERROR = b"\x00", b"\x01", b"\x02"
 HEALTHY, TIGHT = quick_record(), quick_record(HIGH_FRICTION)
 KNOWN = {"baseline_coulomb_friction": Baseline.of(identify(HEALTHY, BENCH_VALVE)).coulomb_friction}
 SECRETS = {"VALVE_FRICTION_WEBHOOK_SECRET": "k3y", "VALVE_FRICTION_WEBHOOK_TOKEN": "t0ken"}

@@ -108,8 +108,7 @@ def test_an_unknown_service_lists_the_known(bench):
 def busy(live):
     """A domain with an identifier whose identification does not end."""
     live.start_identifier(script=faulty("slow"))
-    live.client.send_record(quick_record())
-    live.client.wait_for_buffered(2 * len(quick_record()))
+    live.client.fill(quick_record())
     return live
 
 

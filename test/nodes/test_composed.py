@@ -19,7 +19,7 @@ import pytest
 import rclpy
 from lifecycle_msgs.msg import State, Transition
 from lifecycle_msgs.srv import ChangeState, GetState
-from live_nodes import NAMESPACE, values_of
+from live_nodes import NAMESPACE, NODE, values_of
 from local_server import free_port
 from rcl_interfaces.srv import GetParameters
 from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
@@ -33,7 +33,6 @@ from valve_friction_ros.nodes.identifier.node import Identifier
 from valve_friction_ros.nodes.plumbing import polled_node, polled_subscription, rclpy_private
 from valve_friction_ros.nodes.plumbing.polled_node import TurnExecutor
 
-IDENTIFIER = f"{NAMESPACE}/identifier"
 EXECUTORS = {
     "single": SingleThreadedExecutor,
     "multi": MultiThreadedExecutor,
@@ -102,13 +101,13 @@ def converse(client):
     """Ask a composed identifier for all that a user may ask for."""
     client.connect()
     parameters = client.call(
-        GetParameters, f"{IDENTIFIER}/get_parameters", GetParameters.Request(names=["window"])
+        GetParameters, f"{NODE}/get_parameters", GetParameters.Request(names=["window"])
     )
     assert parameters.values[0].double_value == 60.0
-    client.set_parameters(IDENTIFIER, {"window": 50.0})
+    client.set_parameters(NODE, {"window": 50.0})
     described = client.call(
         GetTypeDescription,
-        f"{IDENTIFIER}/get_type_description",
+        f"{NODE}/get_type_description",
         GetTypeDescription.Request(type_name="none"),
     )
     assert not described.successful  # it knows no such type, and says so
@@ -148,11 +147,11 @@ def test_the_version_of_rclpy_has_been_tried():
 
 def change(client, transition):
     request = ChangeState.Request(transition=Transition(id=transition))
-    return client.call(ChangeState, f"{IDENTIFIER}/change_state", request).success
+    return client.call(ChangeState, f"{NODE}/change_state", request).success
 
 
 def state(client):
-    return client.call(GetState, f"{IDENTIFIER}/get_state", GetState.Request()).current_state.id
+    return client.call(GetState, f"{NODE}/get_state", GetState.Request()).current_state.id
 
 
 def test_life_cycle(live, compose):
@@ -191,7 +190,7 @@ def test_a_wrong_parameter_leaves_the_node_unconfigured(live, compose):
     with spun(compose(lifecycle=True, warn_ratio=3.0), TurnExecutor(context=compose.context)):
         assert not change(client, Transition.TRANSITION_CONFIGURE)
         assert state(client) == State.PRIMARY_STATE_UNCONFIGURED
-        client.set_parameters(IDENTIFIER, {"warn_ratio": 1.5})
+        client.set_parameters(NODE, {"warn_ratio": 1.5})
         assert change(client, Transition.TRANSITION_CONFIGURE)
 
 

@@ -17,7 +17,7 @@ from urllib.parse import parse_qs, quote, urlsplit
 
 import pytest
 from browser import Tab, axe_violations, chromium
-from live_nodes import NAMESPACE, SECOND, START, buffered
+from live_nodes import NAMESPACE, NODE, SECOND, START, buffered
 from local_server import free_port
 from records import quick_record
 
@@ -28,7 +28,6 @@ from valve_friction_ros.model import HIGH_FRICTION
 pytest.importorskip("nicegui", reason="NiceGUI is not installed")
 
 TAG = "<img src=x onerror=alert(1)>"
-NODE = f"{NAMESPACE}/identifier"
 VALVE = f"/valve?node={quote(NODE)}"
 SILENCE = 8.0
 """Long enough for a slow machine."""

@@ -15,7 +15,7 @@ import pytest
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticStatus
 from histories import as_kept
-from live_nodes import NAMESPACE, SECOND, START, stamp_of, values_of
+from live_nodes import NAMESPACE, NODE, SECOND, START, stamp_of, values_of
 from records import quick_record
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
@@ -112,7 +112,6 @@ def test_each_event_is_logged_once(live):
     assert len(lines(process, "level WARN → OK")) == 1
 
 
-NODE = f"{NAMESPACE}/identifier"
 RECORD = quick_record()
 EXPECTED = as_kept(identify(RECORD, BENCH_VALVE).parameters["coulomb_friction"])
 

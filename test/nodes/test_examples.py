@@ -23,7 +23,7 @@ from functools import reduce
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from live_nodes import NAMESPACE, PROJECT, STREAM, stamp_of
+from live_nodes import NAMESPACE, NODE, PROJECT, STREAM, stamp_of
 from local_server import free_port
 from records import quick_record
 from sensor_msgs.msg import FluidPressure, JointState
@@ -374,7 +374,6 @@ def test_a_record_of_a_server_is_identified(server, live):
     assert float(values["coulomb_friction [N]"]) == pytest.approx(400.0, rel=0.02)
 
 
-NODE = f"{NAMESPACE}/identifier"
 DI, OWN = "http://opcfoundation.org/UA/DI/", "urn:valve_friction_ros:health"
 
 
@@ -520,8 +519,7 @@ def test_the_small_dashboard_shows_a_valve_and_what_becomes_of_it(live):
     shown = live.start("worst_valves", script=EXAMPLES / "worst_valves.py", namespace=None)
     client = live.client
     client.wait_until(lambda: "OK    FV-101" in shown.output, "the valve")
-    client.identified(quick_record())
-    assert client.trigger("set_baseline").success
+    client.set_baseline(quick_record())
     client.identified(quick_record(HIGH_FRICTION))
     client.wait_until(lambda: "ERROR FV-101" in shown.output, "the alarm")
     assert shown.output.splitlines()[-1].split()[2:5] == ["NE", "107", "F"]

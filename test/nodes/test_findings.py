@@ -14,15 +14,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from live_nodes import NAMESPACE, SECOND, START, values_of
+from live_nodes import ERROR, NODE, OK, SECOND, START, WARN, values_of
 from records import quick_record, simulated, square_record, stroked_record
 
 from valve_friction_ros.health import Baseline
 from valve_friction_ros.identification import identify
 from valve_friction_ros.model import BENCH_VALVE, HIGH_FRICTION, LOW_FRICTION, SensorNoise
 
-NODE = f"{NAMESPACE}/identifier"
-OK, WARN, ERROR = b"\x00", b"\x01", b"\x02"
 LIMITS = {"warn_ratio": 1.5, "error_ratio": 2.0, "low_ratio": 0.5}
 
 
@@ -117,8 +115,7 @@ def test_limits_are_parameters_and_judge_at_once(client):
 def test_parameter_shows_the_baseline_of_the_service_and_replaces_it(live):
     live.start_identifier()
     client = live.client
-    client.identified(quick_record())
-    assert client.trigger("set_baseline").success
+    client.set_baseline(quick_record())
     (shown,) = client.parameters(NODE, "baseline_coulomb_friction")
     told = float(client.last_values()["baseline_coulomb_friction [N]"])
     assert shown == pytest.approx(told, rel=1e-8)
@@ -271,8 +268,7 @@ def test_lost_travel_is_said_though_its_record_is_refused(live, history, is_sche
     """A sixth of the travel is lost: no model follows the record, but the stem's end is seen."""
     node = live.start_identifier()
     client = live.client
-    client.identified(stroked_record())
-    assert client.trigger("set_baseline").success
+    client.set_baseline(stroked_record())
     assert client.next_status().level == OK
     if is_scheduled:
         client.set_parameters(NODE, {"period": 0.5})
@@ -300,10 +296,8 @@ def test_lost_travel_is_said_though_its_record_is_refused(live, history, is_sche
 def test_a_restored_baseline_brings_all_its_numbers_back(live):
     node = live.start_identifier({"baseline_in_alarm": True})
     client = live.client
-    client.identified(HEALTHY)
-    assert client.trigger("set_baseline").success
-    client.identified(WEAK)
-    assert client.trigger("set_baseline").success
+    client.set_baseline(HEALTHY)
+    client.set_baseline(WEAK)
     assert client.next_status(lambda one: one.level == OK, "a new baseline")
     live.kill(node)
 
@@ -317,8 +311,7 @@ def test_a_restored_baseline_brings_all_its_numbers_back(live):
 def test_a_limit_is_a_parameter_and_a_given_friction_says_nothing_of_the_spring(live):
     live.start_identifier({"spring_change": 0.5, "spring_failure": 0.6})
     client = live.client
-    client.identified(HEALTHY)
-    assert client.trigger("set_baseline").success
+    client.set_baseline(HEALTHY)
     client.identified(WEAK)
     assert client.statuses[-1][1].level == OK
     (refused,) = client.set_parameters(NODE, {"spring_change": 0.7})
@@ -340,8 +333,7 @@ def test_a_seized_stem_is_an_alarm_until_it_moves(live):
     record = quick_record()
     live.start_identifier({"window": 3600.0})
     client = live.client
-    client.identified(record)
-    assert client.trigger("set_baseline").success
+    client.set_baseline(record)
     assert client.next_status().level == OK
     middle = 0.5 * float(record.position.min() + record.position.max())
     resting, supply = float(np.median(record.pressure)), float(record.pressure.max())

@@ -14,14 +14,13 @@ import math
 import numpy as np
 import pytest
 from builtin_interfaces.msg import Time
-from live_nodes import NAMESPACE, SECOND, STREAM, stamps_of, values_of
+from live_nodes import SECOND, STREAM, stamps_of, values_of
 from records import quick_record
 from rosgraph_msgs.msg import Clock
 
 from valve_friction_ros.identification import identify
 from valve_friction_ros.model import BENCH_VALVE, LOW_FRICTION
 
-NODE = f"{NAMESPACE}/identifier"
 RECORD = quick_record()
 STAMPS = stamps_of(RECORD)
 ONE_HOUR = 3600 * SECOND

@@ -11,14 +11,13 @@
 
 import numpy as np
 import pytest
-from live_nodes import NAMESPACE, STREAM, stamps_of, values_of
+from live_nodes import NAMESPACE, OK, STREAM, WARN, stamps_of, values_of
 from records import quick_record
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension, MultiArrayLayout
 
 from valve_friction_ros.identification import identify
 from valve_friction_ros.model import BENCH_VALVE
 
-OK, WARN = b"\x00", b"\x01"
 TOPIC = f"{NAMESPACE}/identifier/samples"
 COLUMNS = "time,pressure,position"
 RECORD = quick_record()

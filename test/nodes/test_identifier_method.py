@@ -11,7 +11,7 @@
 
 import numpy as np
 import pytest
-from live_nodes import NAMESPACE, values_of
+from live_nodes import NODE, values_of
 from records import quick_record, simulated
 from std_msgs.msg import Float64MultiArray
 
@@ -22,8 +22,6 @@ from valve_friction_ros.identification import (
     identify_signature,
 )
 from valve_friction_ros.model import BENCH_VALVE, HIGH_FRICTION, TriangleWave
-
-NODE = f"{NAMESPACE}/identifier"
 
 
 def signature_record():

@@ -12,12 +12,11 @@
 import contextlib
 
 import pytest
-from live_nodes import NAMESPACE, START, STREAM, values_of
+from live_nodes import NAMESPACE, START, STREAM, WARN, values_of
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import FluidPressure, JointState
 from std_msgs.msg import String
 
-WARN = b"\x01"
 PRESSURE, STEM = f"{NAMESPACE}/actuator_pressure", f"{NAMESPACE}/stem_state"
 
 

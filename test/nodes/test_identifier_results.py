@@ -47,8 +47,7 @@ def bench(shared):
     client = shared.client
     early = client.listen(Float64, f"{NAMESPACE}/identifier/friction/coulomb_friction")
     record = bench_record()
-    client.send_record(record)
-    client.wait_for_buffered(2 * len(record))
+    client.fill(record)
     response = client.trigger("identify")
     assessment = identify_bench(record, BENCH_VALVE, IdentificationSettings(position_bias=BIAS))
     return client, assessment, response, early

@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
-from live_nodes import NAMESPACE, PROJECT, SECOND, START, values_of
+from live_nodes import NAMESPACE, PROJECT, SECOND, START, WARN, values_of
 from records import quick_record
 from std_srvs.srv import Trigger
 
@@ -138,7 +138,6 @@ def test_a_valve_of_a_plant_takes_little_of_the_graph(live):
 
 
 RATE, WINDOW = 10_000, 20.0
-WARN = b"\x01"
 OWN, OTHERS = 10.0, 2.0
 """Most processor time, s, for the answer of the flooded valve, and before that of another: beside
 what taking the samples in costs."""

@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from histories import VALVE
-from live_nodes import NAMESPACE, PROJECT, SECOND, START, STREAM, time_of, values_of
+from live_nodes import NAMESPACE, NODE, OK, PROJECT, SECOND, START, STREAM, WARN, time_of, values_of
 from rclpy.duration import Duration
 from records import quick_record
 from sensor_msgs.msg import JointState
@@ -29,8 +29,6 @@ from valve_friction_ros.history import HistoryFile, read_answers, read_moves, re
 from valve_friction_ros.model import BENCH_VALVE, LOW_FRICTION
 from valve_friction_ros.streams import DAY
 
-NODE = f"{NAMESPACE}/identifier"
-OK, WARN = b"\x00", b"\x01"
 TRAVEL = BENCH_VALVE.travel
 PERIOD = 10 * SECOND
 DISTANCE = "travelled_distance [m]"
@@ -175,7 +173,6 @@ MINUTE = 60.0
 SECURE = {"timing_uncertainty": 0.01}
 CYCLE = np.array([0.42, 0.45, 0.48, 0.51, 0.48, 0.45]) * BUILT.travel
 MOVES = 48
-WARN = b"\x01"
 
 
 def serve(client, first, friction):

@@ -13,13 +13,12 @@ import math
 import re
 
 import pytest
-from live_nodes import NAMESPACE, SECOND, STREAM, buffered, stamp_of, time_of
+from live_nodes import NAMESPACE, NODE, SECOND, STREAM, WARN, buffered, stamp_of, time_of
 from rcl_interfaces.msg import ParameterType
 from records import quick_record
 from rosgraph_msgs.msg import Clock
 
 NODES = ("identifier", "simulator", "pressure_source")
-NODE = f"{NAMESPACE}/identifier"
 OF_ROS = re.compile(r"use_sim_time|start_type_description_service|qos_overrides\..*")
 CHECKED_BY_RULE = {  # floating parameters that may be infinite or not given, so have no range
     "travel": -0.01,
@@ -181,7 +180,7 @@ def test_no_clock_is_said(live):
     live.start("identifier", {"use_sim_time": True})
     client = live.client
     status = client.next_status(lambda one: "no time on /clock" in one.message, "a warning")
-    assert status.level == b"\x01"
+    assert status.level == WARN
     clock = client.node.create_publisher(Clock, "/clock", STREAM)
 
     def is_quiet():

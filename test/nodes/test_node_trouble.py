@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
 from faulty_identifier import BEGINNING, FINISH, LOOP, MENDED, RAISE, TIMER, faulty
-from live_nodes import NAMESPACE, buffered, stamps_of, values_of
+from live_nodes import ERROR, NAMESPACE, OK, buffered, stamps_of, values_of
 from records import quick_record, simulated
 from sensor_msgs.msg import FluidPressure, JointState
 from std_srvs.srv import Trigger
@@ -38,8 +38,7 @@ def test_a_damaged_message_costs_only_itself(live, kind, topic):
     words = f"{topic}: {told}"
     client.wait_until(lambda: words in process.errors, "the warning")
     record = quick_record()
-    client.send_record(record)
-    client.wait_for_buffered(2 * len(record))
+    client.fill(record)
     assert client.trigger("identify").success
     client.node.destroy_publisher(stranger)
 
@@ -57,14 +56,14 @@ def test_a_bug_is_an_error_and_the_node_lives_on(live, tmp_path, where):
     process = started(live, tmp_path, where)
     process.forgive_tracebacks()
     status = live.client.next_status(lambda one: "a bug" in one.message, "the bug")
-    assert status.level == b"\x02"
+    assert status.level == ERROR
     assert status.message.startswith("internal error: ZeroDivisionError: a bug")
     assert values_of(status)["NE 107"] == "C"
     live.client.next_status()
     assert process.errors.count("Traceback") == 1  # not at each turn
     (tmp_path / RAISE).unlink()
     status = live.client.next_status(lambda one: "a bug" not in one.message, "its end")
-    assert status.level < b"\x02"
+    assert status.level < ERROR
 
 
 class TestOneOfSeveral:
@@ -93,7 +92,7 @@ class TestOneOfSeveral:
 
     def require_others(self, client, statuses):
         for name in ("/fv_101/identifier: friction", "/fv_103/identifier: friction"):
-            assert statuses[name].level == b"\x00", statuses[name]
+            assert statuses[name].level == OK, statuses[name]
         assert client.trigger("clear").success
         client.send_record(quick_record())
         client.next_status(
@@ -111,7 +110,7 @@ class TestOneOfSeveral:
         process = self.start(live, tmp_path, faulty)
         found = self.statuses(live.client)
         status, told = found["/fv_102/identifier: friction"], "travel must be above zero, got -1"
-        assert (status.level, status.hardware_id) == (b"\x02", "FV-102")
+        assert (status.level, status.hardware_id) == (ERROR, "FV-102")
         assert status.message == f"cannot start, so this valve is not monitored: {told}"
         assert values_of(status)["NE 107"] == "C"
         assert live.client.latched(DiagnosticStatus, "/fv_102/identifier/estimate") == status
@@ -133,11 +132,11 @@ class TestOneOfSeveral:
             (tmp_path / "draft").rename(tmp_path / RAISE)
             status = live.client.next_status(lambda one: "a bug" in one.message, "the bug")
             assert status.name == "/fv_102/identifier: friction"
-            assert status.level == b"\x02"
+            assert status.level == ERROR
             self.require_others(live.client, self.statuses(live.client))
         (tmp_path / RAISE).unlink()
         live.client.next_status(
-            lambda one: one.name.startswith("/fv_102") and one.level < b"\x02", "its end"
+            lambda one: one.name.startswith("/fv_102") and one.level < ERROR, "its end"
         )
 
     def test_a_bug_at_the_start(self, live, tmp_path):
@@ -146,13 +145,12 @@ class TestOneOfSeveral:
         process.forgive_tracebacks()
         found = self.statuses(live.client)
         status = found["/fv_102/identifier: friction"]
-        assert status.level == b"\x02"
+        assert status.level == ERROR
         assert "this valve is not monitored: internal error: ZeroDivisionError" in status.message
         self.require_others(live.client, found)
 
 
 IDENTIFY = f"{NAMESPACE}/identifier/identify"
-OK, ERROR = b"\x00", b"\x02"
 
 
 def nodes_of(client):
@@ -174,8 +172,7 @@ def begin_identification(client):
 def test_ctrl_c_during_an_identification(live, tmp_path):
     process = live.start_identifier(script=faulty("slow"))
     client = live.client
-    client.send_record(quick_record())
-    client.wait_for_buffered(1000)
+    client.fill(quick_record())
     begin_identification(client)
     client.watched.remove(process)
     process.interrupt()
@@ -215,8 +212,7 @@ def test_a_bug_is_an_internal_error_and_the_next_record_identifies(live, tmp_pat
     history = HistoryFile(tmp_path / "valve_friction_ros" / "history.sqlite")
     process = live.start_identifier(script=faulty("failing"))
     client = live.client
-    client.send_record(quick_record())
-    client.wait_for_buffered(1000)
+    client.fill(quick_record())
     response = client.trigger("identify")
     assert not response.success
     words = "internal error: ZeroDivisionError: nobody foresaw it (faulty_identifier.py, line "

@@ -25,7 +25,7 @@ import numpy as np
 import pytest
 import yaml
 from faulty_identifier import FINISH, FULL, SLOW, faulty
-from live_nodes import NAMESPACE, PROJECT, SECOND, STREAM, stamps_of, time_of
+from live_nodes import NAMESPACE, NODE, PROJECT, SECOND, STREAM, stamps_of, time_of
 from rclpy.duration import Duration
 from records import quick_record
 from rosbags.rosbag2 import Reader
@@ -38,7 +38,6 @@ from valve_friction_ros.model import BENCH_VALVE
 from valve_friction_ros.streams import RecordBuffer
 
 WINDOW = 4.0
-IDENTIFIER = f"{NAMESPACE}/identifier"
 DAY = 86_400 * SECOND
 
 
@@ -183,13 +182,13 @@ def test_a_saved_buffer_gives_the_numbers_of_the_node(run):
 
 def test_a_saved_buffer_knows_the_settings_of_the_node(run):
     changes = {"method": "bench", "fixed.mass": 1.6, "derivative_window": 21}
-    assert run.client.set_together(IDENTIFIER, changes).successful
+    assert run.client.set_together(NODE, changes).successful
     assert run.client.trigger("identify").success
     numbers = told_by(run.client)
     assert "nan" not in (numbers["threshold"], numbers["published coulomb_friction"])
     saved = Path(run.client.trigger("save").message)
     before = {"method": "plant", "fixed.mass": math.nan, "derivative_window": 0}
-    assert run.client.set_together(IDENTIFIER, before).successful
+    assert run.client.set_together(NODE, before).successful
     answer = identified(saved)
     assert answer["method"] == "bench"
     assert answer["parameters"]["mass"]["verdict"] == "fixed"
@@ -242,7 +241,7 @@ def test_what_cannot_be_written_is_told_and_the_node_goes_on(live, tmp_path):
 def test_the_node_goes_on_while_it_saves(live, tmp_path):
     folder = tmp_path / SLOW
     start_saving_into(live, folder)
-    saving = live.client.request(Trigger, f"{IDENTIFIER}/save", Trigger.Request())
+    saving = live.client.request(Trigger, f"{NODE}/save", Trigger.Request())
     live.client.next_status()
     assert live.client.trigger("set_baseline").success
     assert not saving.done()

@@ -17,12 +17,11 @@ import sys
 
 import pytest
 import yaml
-from live_nodes import NAMESPACE, PROJECT, Domain, NodeProcess, values_of
+from live_nodes import NAMESPACE, NODE, PROJECT, Domain, NodeProcess, values_of
 from local_server import free_port
 
 from valve_friction_ros.records.files import data_folder
 
-NODE = f"{NAMESPACE}/identifier"
 PLAYED = str(PROJECT / "test/nodes/played_pressure.csv")
 OF_A_FILE = {"excitation": "file", "file": PLAYED}
 REFUSED = {  # node, parameters, words of the only line

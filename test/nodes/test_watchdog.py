@@ -17,14 +17,13 @@ import time
 
 import pytest
 from faulty_identifier import BLOCK, CLEAN_UP, FINISH, FREEZE, LOOP, MIDDLEWARE, faulty
-from live_nodes import NAMESPACE, values_of
+from live_nodes import ERROR, NAMESPACE, WARN, values_of
 from records import quick_record
 from std_srvs.srv import Trigger
 from waiting import PATIENCE
 
 from valve_friction_ros.nodes.plumbing.worker import Worker, workers_have_ended
 
-OK, WARN, ERROR = b"\x00", b"\x01", b"\x02"
 WITHIN = 3.0
 """Time, s, in which a node ends after a signal, as promised; a loaded machine adds to it."""
 
@@ -127,8 +126,7 @@ def test_a_stuck_node_ends_all_the_same(live, stuck, number):
 def test_an_identification_that_does_not_return(live, tmp_path, systemd):
     process = live.start_identifier({"identification_limit": 1.0}, script=faulty("slow"))
     client = live.client
-    client.send_record(quick_record())
-    client.wait_for_buffered(1000)
+    client.fill(quick_record())
     running = client.request(Trigger, f"{NAMESPACE}/identifier/identify", Trigger.Request())
     status = client.next_status(
         lambda one: "beyond identification_limit (1 s)" in one.message, "a warning"
@@ -146,8 +144,7 @@ def test_an_identification_that_does_not_return(live, tmp_path, systemd):
 def test_ctrl_c_leaves_an_identification_that_does_not_return(live):
     process = live.start_identifier(script=faulty("slow"))
     client = live.client
-    client.send_record(quick_record())
-    client.wait_for_buffered(1000)
+    client.fill(quick_record())
     client.request(Trigger, f"{NAMESPACE}/identifier/identify", Trigger.Request())
     assert "already running" in client.trigger("identify").message
     begin = time.monotonic()
