@@ -68,6 +68,8 @@ BAD_CHANGES = [  # changes, words of the reason
         "there is no method 'guess': choose from plant, bench, published, signature",
     ),
     ({"joint": "arm"}, "joint"),
+    ({"alarm_kind": "unknown"}, "alarm_kind"),
+    ({"alarm_hours": math.inf}, "alarm_hours"),
     ({"valve_tag": "FV-102"}, "valve_tag"),
     *(
         ({name: value}, f"read-only parameter: {name}")
