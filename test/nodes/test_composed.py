@@ -224,7 +224,6 @@ def test_pages_rest_with_the_node(live):
 PAGE = PROJECT / "doc" / "reference" / "nodes.md"
 
 
-@pytest.mark.usefixtures("ros_environment")
 @pytest.mark.parametrize(
     ("node", "some"),
     [

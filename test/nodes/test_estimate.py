@@ -12,19 +12,17 @@
 import math
 
 import pytest
-from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticStatus
 from histories import as_kept
-from live_nodes import NAMESPACE, NODE, SECOND, START, stamp_of, values_of
+from live_nodes import NAMESPACE, NODE, SECOND, START, SimulatedClock, stamp_of, values_of
 from records import quick_record
-from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 
 from valve_friction_ros.health import Level
 from valve_friction_ros.identification import identify
 from valve_friction_ros.model import BENCH_VALVE, Recording
 
-TOPIC = f"{NAMESPACE}/identifier/estimate"
+TOPIC = f"{NODE}/estimate"
 BUFFERED = {"buffered_samples", "buffered_pressures", "buffered_positions"}
 OF_THE_INPUTS = {"estimate_age [s]", *BUFFERED}
 
@@ -174,27 +172,23 @@ def test_by_simulated_time(live):
     """The clock of a simulation or of a bag, not the wall's."""
     live.start_identifier({"period": 100.0, "use_sim_time": True})
     client = live.client
-    clock = client.node.create_publisher(Clock, "/clock", 10)
-    now = 1_000
+    clock = SimulatedClock(client)
+    clock.now = 1_000 * SECOND
 
     def tick_until(condition, step):
-        nonlocal now
         before = len(client.statuses)
-
-        def met():
-            nonlocal now
-            now += step
-            clock.publish(Clock(clock=Time(sec=now)))
-            return any(condition(*one) for one in client.statuses[before:])
-
-        client.wait_until(met, "a status")
+        clock.run_until(
+            lambda: any(condition(*one) for one in client.statuses[before:]),
+            "a status",
+            step * SECOND,
+        )
 
     def skipped_at(stamp, status):
         age = float(values_of(status).get("scheduled_skip_age [s]", "nan"))
         return stamp_of(stamp) / SECOND - age if skipped("no samples")(status) else math.nan
 
     tick_until(lambda _, status: "/clock" not in status.message, 0)
-    reached = now
+    reached = clock.now / SECOND
     # The first clock comes long after zero, so the schedule is due at once, and 100 s later.
     tick_until(lambda *one: skipped_at(*one) >= reached, 1)
     tick_until(lambda *one: skipped_at(*one) >= reached + 100, 1)

@@ -13,10 +13,9 @@ import math
 import re
 
 import pytest
-from live_nodes import NAMESPACE, NODE, SECOND, STREAM, WARN, buffered, stamp_of, time_of
+from live_nodes import NAMESPACE, NODE, SECOND, WARN, SimulatedClock, buffered, stamp_of
 from rcl_interfaces.msg import ParameterType
 from records import quick_record
-from rosgraph_msgs.msg import Clock
 
 NODES = ("identifier", "simulator", "pressure_source")
 OF_ROS = re.compile(r"use_sim_time|start_type_description_service|qos_overrides\..*")
@@ -178,54 +177,30 @@ def test_numbers_may_be_texts(client, text):
     assert math.isnan(fixed)
 
 
-def test_no_clock_is_said(live):
-    live.start("identifier", {"use_sim_time": True})
-    client = live.client
-    status = client.next_status(lambda one: "no time on /clock" in one.message, "a warning")
-    assert status.level == WARN
-    clock = client.node.create_publisher(Clock, "/clock", STREAM)
-
-    def is_quiet():
-        clock.publish(Clock(clock=time_of(5000 * SECOND)))
-        return "/clock" not in client.statuses[-1][1].message
-
-    client.wait_until(is_quiet, "a status without the warning")
-
-
 def test_simulated_time(live):
+    """Without a clock it is missed; a clock that is set back empties the buffer."""
     live.start_identifier()
     client = live.client
-    clock = client.node.create_publisher(Clock, "/clock", STREAM)
-    (result,) = client.set_parameters(NODE, {"use_sim_time": True})
-    assert result.successful, result.reason
-    client.wait_until(clock.get_subscription_count, "a subscription to the clock")
+    assert client.set_together(NODE, {"use_sim_time": True}).successful
+    status = client.next_status(lambda one: "no time on /clock" in one.message, "a warning")
+    assert status.level == WARN
+    clock = SimulatedClock(client)
 
-    def run_clock_until(start, condition, what):
-        now = start
+    def run_until_stamped(begin, end):
+        clock.now, seen = begin, len(client.statuses)
+        clock.run_until(
+            lambda: any(begin <= stamp_of(at) < end for at, _ in client.statuses[seen:]),
+            f"a diagnostic from {begin} to {end}",
+        )
 
-        def met():
-            nonlocal now
-            now += SECOND // 20
-            clock.publish(Clock(clock=time_of(now)))
-            return condition()
-
-        client.wait_until(met, what)
-
-    def stamped_by(begin, end):
-        seen = len(client.statuses)
-        return lambda: any(begin <= stamp_of(stamp) < end for stamp, _ in client.statuses[seen:])
-
-    run_clock_until(
-        5000 * SECOND, stamped_by(5000 * SECOND, 6000 * SECOND), "a diagnostic by the clock"
-    )
+    run_until_stamped(5000 * SECOND, 6000 * SECOND)
+    assert "/clock" not in client.next_status().message
     client.send_record(quick_record())
     seen = len(client.statuses)
-    run_clock_until(
-        6000 * SECOND,
-        lambda: any(buffered(status) == 1000 for _, status in client.statuses[seen:]),
-        "all samples",
+    clock.run_until(
+        lambda: any(buffered(status) == 1000 for _, status in client.statuses[seen:]), "all samples"
     )
-    run_clock_until(1000 * SECOND, stamped_by(1000 * SECOND, 2000 * SECOND), "the clock set back")
+    run_until_stamped(1000 * SECOND, 2000 * SECOND)
     response = client.trigger("identify")
     assert not response.success
     assert "no samples" in response.message

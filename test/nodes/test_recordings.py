@@ -9,7 +9,6 @@
 
 """Recorded topics and saved buffers: the command reads out of them what the node found."""
 
-import itertools
 import json
 import math
 import re
@@ -25,11 +24,10 @@ import numpy as np
 import pytest
 import yaml
 from faulty_identifier import FINISH, FULL, SLOW, faulty
-from live_nodes import NAMESPACE, NODE, PROJECT, SECOND, STREAM, stamps_of, time_of
+from live_nodes import NAMESPACE, NODE, PROJECT, SECOND, STREAM, SimulatedClock, stamp_of, stamps_of
 from rclpy.duration import Duration
 from records import quick_record
 from rosbags.rosbag2 import Reader
-from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import FluidPressure, JointState
 from std_srvs.srv import Trigger
 
@@ -137,37 +135,32 @@ def test_a_recorded_run_gives_the_numbers_of_the_node(run):
     assert numbers_of(whole) != run.numbers  # its first second changes the numbers
 
 
+def last_stamp(client):
+    return stamp_of(client.statuses[-1][0]) if client.statuses else 0
+
+
 def test_a_played_bag_gives_the_numbers_of_the_live_run(run, live):
     """Its messages come on the topics, and a time of the day before on /clock."""
     live.start("identifier", {"window": WINDOW, "use_sim_time": True, "input_timeout": 600.0})
     client = live.client
     client.connect()
-    clock = client.node.create_publisher(Clock, "/clock", STREAM)
-    client.wait_until(clock.get_subscription_count, "a subscription to the clock")
+    clock = SimulatedClock(client)
     topics = {"actuator_pressure": client._pressure, "stem_state": client._stem}
-    shown = []
-
-    def tick(time):
-        shown.append(time)
-        clock.publish(Clock(clock=time_of(time)))
-
     with Reader(run.recorded) as bag:
         messages = [*bag.messages()]
-        earlier = itertools.count(messages[0][1] - DAY - 60 * SECOND, SECOND // 10)
-        client.wait_until(  # the node's time is that of /clock before the first sample comes
-            lambda: tick(next(earlier)) or client.statuses, "a status"
-        )
+        begun = clock.now = messages[0][1] - DAY - 60 * SECOND
+        # The node's time is that of /clock before the first sample comes.
+        clock.run_until(lambda: begun <= last_stamp(client), "a status of that time")
         for count, (connection, received, data) in enumerate(messages):
             if count % 100 == 0:
-                tick(received - DAY)
+                clock.show(received - DAY)
                 for publisher in topics.values():
                     assert publisher.wait_for_all_acked(Duration(seconds=60.0))
             topics[connection.topic.rpartition("/")[2]].publish(bytes(data))
-    client.node.create_timer(0.05, lambda: tick(shown[-1] + SECOND // 20))
+    client.node.create_timer(0.05, lambda: clock.show(clock.now + SECOND // 20))
     client.identified_whole(held(quick_record()))
     assert told_by(client) == run.numbers
-    stamp = client.statuses[-1][0]
-    assert shown[0] <= stamp.sec * SECOND + stamp.nanosec <= shown[-1]
+    assert begun <= last_stamp(client) <= clock.now
 
 
 def test_a_saved_buffer_gives_the_numbers_of_the_node(run):
@@ -176,6 +169,8 @@ def test_a_saved_buffer_gives_the_numbers_of_the_node(run):
     saved = Path(response.message)
     assert saved.parent == run.folder / "saved"
     assert re.fullmatch(r"fv_101_\d{8}T\d{6}Z", saved.name)
+    with Reader(saved) as bag:
+        assert set(bag.topics) == {f"{NAMESPACE}/actuator_pressure", f"{NAMESPACE}/stem_state"}
     for options in (("--valve", saved / "valve.yaml"), ()):  # its own is found
         assert numbers_of(identified(saved, *options)) == run.numbers
 
@@ -193,28 +188,6 @@ def test_a_saved_buffer_knows_the_settings_of_the_node(run):
     assert answer["method"] == "bench"
     assert answer["parameters"]["mass"]["verdict"] == "fixed"
     assert numbers_of(answer) == numbers
-
-
-def test_topics_and_stamps_of_a_saved_buffer(run):
-    saved = Path(run.client.trigger("save").message)
-    heard = {data for topic, data in messages(run.recorded)}
-    last = {data for topic, data in messages(saved)}
-    assert {topic for topic, _ in messages(saved)} == {
-        f"{NAMESPACE}/actuator_pressure",
-        f"{NAMESPACE}/stem_state",
-    }
-    assert last < heard
-
-
-def messages(bag):
-    """Topic, and stamp and value of each message; padding between the fields is not compared."""
-    with Reader(bag) as reader:
-        for connection, _, data in reader.messages():
-            message = bags.TYPES.deserialize_cdr(data, connection.msgtype)
-            stamp = message.header.stamp
-            value = getattr(message, "fluid_pressure", None)
-            value = message.position[0] if value is None else value
-            yield connection.topic, (connection.topic, stamp.sec, stamp.nanosec, value)
 
 
 def start_saving_into(live, folder, **parameters):
