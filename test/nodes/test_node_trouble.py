@@ -153,12 +153,6 @@ class TestOneOfSeveral:
 IDENTIFY = f"{NAMESPACE}/identifier/identify"
 
 
-def nodes_of(client):
-    """Names of the nodes in the valve's namespace."""
-    found = client.node.get_node_names_and_namespaces()
-    return {name for name, namespace in found if namespace == NAMESPACE}
-
-
 def begin_identification(client):
     """Request an identification, and return its future once it is under way."""
     running = client.request(Trigger, IDENTIFY, Trigger.Request())
@@ -167,18 +161,6 @@ def begin_identification(client):
     assert "already running" in second.message
     assert not running.done()
     return running
-
-
-def test_ctrl_c_during_an_identification(live, tmp_path):
-    process = live.start_identifier(script=faulty("slow"))
-    client = live.client
-    client.fill(quick_record())
-    begin_identification(client)
-    client.watched.remove(process)
-    process.interrupt()
-    client.wait_until(lambda: "identifier" not in nodes_of(client), "the end of the node")
-    (tmp_path / FINISH).touch()
-    process.require_good_end()
 
 
 def test_long_identification_loses_no_sample(live, tmp_path):

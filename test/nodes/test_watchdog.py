@@ -12,7 +12,6 @@
 import contextlib
 import signal
 import socket
-import threading
 import time
 
 import pytest
@@ -20,9 +19,6 @@ from faulty_identifier import BLOCK, CLEAN_UP, FINISH, FREEZE, LOOP, MIDDLEWARE,
 from live_nodes import ERROR, NAMESPACE, WARN, values_of
 from records import quick_record
 from std_srvs.srv import Trigger
-from waiting import PATIENCE
-
-from valve_friction_ros.nodes.plumbing.worker import Worker, workers_have_ended
 
 WITHIN = 3.0
 """Time, s, in which a node ends after a signal, as promised; a loaded machine adds to it."""
@@ -150,28 +146,6 @@ def test_ctrl_c_leaves_an_identification_that_does_not_return(live):
     begin = time.monotonic()
     process.stop()
     assert time.monotonic() - begin < WITHIN + 1.0
-
-
-class TestWorker:
-    def test_it_tells_how_long_it_has_been_busy(self):
-        finish = threading.Event()
-        with Worker("test") as worker:
-            assert worker.busy_for() == 0.0
-            assert not worker.is_busy
-            done = worker.submit(finish.wait, PATIENCE)
-            while not worker.busy_for() > 0.05:
-                time.sleep(0.01)
-            assert worker.is_busy
-            finish.set()
-            assert done.result() is True
-            assert worker.busy_for() == 0.0
-
-    @pytest.mark.parametrize("finishes", [True, False])
-    def test_the_end_waits_for_what_finishes(self, finishes):
-        with Worker("test", finishes=finishes) as worker:
-            worker.submit(time.sleep, 0.3)
-            assert workers_have_ended(PATIENCE) == finishes
-        assert workers_have_ended(0.0)
 
 
 def frozen_end(live, tmp_path, what):
