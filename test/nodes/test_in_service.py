@@ -188,8 +188,7 @@ def number(values, key):
     return float(values.get(f"evidence {key}", "nan"))
 
 
-def test_it_adds_up_and_survives_a_kill(live, tmp_path):
-    history = HistoryFile(tmp_path / "valve_friction_ros" / "history.sqlite")
+def test_it_adds_up_and_survives_a_kill(live, history):
     node, client = live.start_identifier(SECURE), live.client
 
     def in_file():
@@ -211,9 +210,7 @@ def test_it_adds_up_and_survives_a_kill(live, tmp_path):
     answer = client.trigger("set_baseline")
     assert answer.success, answer.message
     assert "moves in service since 2023-11-14" in answer.message
-    node.kill()
-    live.nodes.remove(node)
-    client.watched.clear()
+    live.kill(node)
 
     kept = in_file()
     live.start_identifier(SECURE)
@@ -238,12 +235,11 @@ def test_it_adds_up_and_survives_a_kill(live, tmp_path):
     assert "the valve is in WARN" in refused.message
 
 
-def test_the_newer_of_identification_and_moves_leads_and_is_the_baseline(live, tmp_path):
+def test_the_newer_of_identification_and_moves_leads_and_is_the_baseline(live, history):
     """A record of 300 N at 22:13 is followed by moves of 300 N, and then by moves of 450 N."""
     packing = replace(
         LOW_FRICTION, coulomb_friction=300.0, static_friction=300.0, viscous_friction=500.0
     )
-    history = HistoryFile(tmp_path / "valve_friction_ros" / "history.sqlite")
     live.start_identifier(SECURE)
     client = live.client
     client.identified(quick_record(packing))
@@ -270,17 +266,7 @@ def test_the_newer_of_identification_and_moves_leads_and_is_the_baseline(live, t
     assert kept.numbers["spring_constant"].value == pytest.approx(2.05e5, rel=0.01)
 
 
-def test_another_actuator_makes_other_forces(shared):
-    shared.start_identifier()
-    client = shared.client
-    serve(client, 0, 300.0)
-    client.next_status(lambda status: number(values_of(status), "moves") > 40, "the moves")
-    node = f"{NAMESPACE}/identifier"
-    assert client.set_together(node, {"diaphragm_area": 0.05}).successful
-    client.next_status(lambda status: number(values_of(status), "moves") == 0, "no moves")
-
-
-def test_a_renewed_packing_and_a_wrong_stamp(live):
+def test_a_renewed_packing_a_wrong_stamp_and_another_actuator(live):
     live.start_identifier(SECURE)
     client = live.client
     serve(client, 0, 300.0)
@@ -288,8 +274,7 @@ def test_a_renewed_packing_and_a_wrong_stamp(live):
         lambda status: number(values_of(status), "reference [N]") > 0, "a reference"
     )
     assert number(before, "reference [N]") == pytest.approx(300.0, rel=0.03)
-    node = f"{NAMESPACE}/identifier"
-    changed = client.set_together(node, {"travel": 0.03})
+    changed = client.set_together(NODE, {"travel": 0.03})
     assert changed.successful, changed.reason
     serve(client, -100_000, 300.0)
     left = client.status_values(
@@ -306,6 +291,8 @@ def test_a_renewed_packing_and_a_wrong_stamp(live):
     )
     assert number(after, "reference [N]") == pytest.approx(450.0, rel=0.03)
     assert "evidence change_ratio" not in after
+    assert client.set_together(NODE, {"diaphragm_area": 0.05}).successful  # makes other forces
+    client.next_status(lambda status: number(values_of(status), "moves") == 0, "no moves")
 
 
 RATE = 20
@@ -366,7 +353,7 @@ def test_moves_in_service(live, unit, scale):
     assert "the actuator pressure itself responds late: check the positioner" in status.message
 
 
-def test_the_figures_outlive_a_kill(live, tmp_path):
+def test_the_figures_outlive_a_kill(live, history):
     """They are kept, shown by a node that hears no command yet, in its page and by a command."""
     slow = {"window": 3600.0, "dead_time_limit": 0.8}
     node, client = live.start_identifier(slow), live.client
@@ -378,8 +365,7 @@ def test_the_figures_outlive_a_kill(live, tmp_path):
         return status.level == WARN and values_of(status)["moves"] == "6"
 
     before = values_of(client.next_status(is_late, "a late stem"))
-    file = HistoryFile(tmp_path / "valve_friction_ros" / "history.sqlite")
-    client.wait_until(lambda: len(read_answers(file, NODE)) == 6, "the moves in the history")
+    client.wait_until(lambda: len(read_answers(history, NODE)) == 6, "the moves in the history")
     live.kill(node)
 
     live.start_identifier({**slow, "method": "bench"})
@@ -395,7 +381,7 @@ def test_the_figures_outlive_a_kill(live, tmp_path):
     assert "Answer to the command" in page
     assert "latest 6 steps of stem_command, from 2023-11-14 22:13 to 2023-11-14 22:14" in page
     shown = subprocess.run(
-        [sys.executable, "-m", "valve_friction_ros", "history", str(file.path)],
+        [sys.executable, "-m", "valve_friction_ros", "history", str(history.path)],
         cwd=PROJECT,
         capture_output=True,
         text=True,
@@ -406,7 +392,7 @@ def test_the_figures_outlive_a_kill(live, tmp_path):
     assert client.trigger("reset_usage").success
     client.status_values(lambda one: values_of(one)["moves"] == "0", "a new packing")
     assert client.next_status().level == OK
-    assert read_answers(file, NODE) == ()
+    assert read_answers(history, NODE) == ()
 
 
 def test_without_a_command_nothing_is_said(live):

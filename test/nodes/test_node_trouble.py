@@ -18,7 +18,6 @@ from records import quick_record, simulated
 from sensor_msgs.msg import FluidPressure, JointState
 from std_srvs.srv import Trigger
 
-from valve_friction_ros.history import HistoryFile
 from valve_friction_ros.identification import published_estimate
 from valve_friction_ros.model import BENCH_VALVE, Recording, SineWave
 
@@ -41,29 +40,6 @@ def test_a_damaged_message_costs_only_itself(live, kind, topic):
     client.fill(record)
     assert client.trigger("identify").success
     client.node.destroy_publisher(stranger)
-
-
-def started(live, tmp_path, where):
-    process = live.start("identifier", script=faulty("raising"))
-    live.client.next_status()
-    (tmp_path / "draft").write_text(where)
-    (tmp_path / "draft").rename(tmp_path / RAISE)
-    return process
-
-
-@pytest.mark.parametrize("where", [LOOP, TIMER])
-def test_a_bug_is_an_error_and_the_node_lives_on(live, tmp_path, where):
-    process = started(live, tmp_path, where)
-    process.forgive_tracebacks()
-    status = live.client.next_status(lambda one: "a bug" in one.message, "the bug")
-    assert status.level == ERROR
-    assert status.message.startswith("internal error: ZeroDivisionError: a bug")
-    assert values_of(status)["NE 107"] == "C"
-    live.client.next_status()
-    assert process.errors.count("Traceback") == 1  # not at each turn
-    (tmp_path / RAISE).unlink()
-    status = live.client.next_status(lambda one: "a bug" not in one.message, "its end")
-    assert status.level < ERROR
 
 
 class TestOneOfSeveral:
@@ -123,17 +99,18 @@ class TestOneOfSeveral:
 
     def test_that_fails_while_it_runs(self, live, tmp_path):
         """At its start already, then in its diagnostics; each time the others go on."""
-        script = faulty("one_raising")
-        process = self.start(live, tmp_path, "", script)
+        process = self.start(live, tmp_path, "", faulty("one_raising"))
         process.forgive_tracebacks()
         self.require_others(live.client, self.statuses(live.client))
-        for where in (LOOP, TIMER):
+        for count, where in enumerate((LOOP, TIMER), 1):
             (tmp_path / "draft").write_text(where)
             (tmp_path / "draft").rename(tmp_path / RAISE)
             status = live.client.next_status(lambda one: "a bug" in one.message, "the bug")
             assert status.name == "/fv_102/identifier: friction"
-            assert status.level == ERROR
+            assert (status.level, values_of(status)["NE 107"]) == (ERROR, "C")
+            assert status.message.startswith("internal error: ZeroDivisionError: a bug")
             self.require_others(live.client, self.statuses(live.client))
+            assert process.errors.count("Traceback") == count  # not at each turn
         (tmp_path / RAISE).unlink()
         live.client.next_status(
             lambda one: one.name.startswith("/fv_102") and one.level < ERROR, "its end"
@@ -190,8 +167,7 @@ def test_long_identification_loses_no_sample(live, tmp_path):
     assert client.friction("sigma") == {"sigma": sigma}
 
 
-def test_a_bug_is_an_internal_error_and_the_next_record_identifies(live, tmp_path):
-    history = HistoryFile(tmp_path / "valve_friction_ros" / "history.sqlite")
+def test_a_bug_is_an_internal_error_and_the_next_record_identifies(live, history, tmp_path):
     process = live.start_identifier(script=faulty("failing"))
     client = live.client
     client.fill(quick_record())
