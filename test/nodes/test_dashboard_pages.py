@@ -45,6 +45,7 @@ def plant(shared):
         lambda: "ready: open" in shared.dashboard.errors + shared.dashboard.output, "the server"
     )
     shared.address = f"http://127.0.0.1:{port}"
+    shared.history = HistoryFile(shared.folder / "valve_friction_ros" / "history.sqlite")
     return shared
 
 
@@ -440,11 +441,10 @@ def test_an_alarm_is_acknowledged_with_a_name_and_exported(identified, tab):
 )
 def test_of_many_those_near_the_view_are_drawn(plant, tab, path, line):
     """All come as the page is scrolled."""
-    history = HistoryFile(plant.folder / "valve_friction_ros" / "history.sqlite")
     shown = Condition(Level.ERROR, StatusSignal.FAILURE, "excess friction")
     for number in range(400):
         valve = KeptValve(f"/many/fv_{number}/identifier", f"MANY-{number}")
-        follow_alarms(history, valve, {AlarmKind.FRICTION_HIGH: shown}, time.time_ns())
+        follow_alarms(plant.history, valve, {AlarmKind.FRICTION_HIGH: shown}, time.time_ns())
     page = tab.open(path)
     lines = page.locator(line)
     page.get_by_text("more below").wait_for()
@@ -457,18 +457,19 @@ def test_of_many_those_near_the_view_are_drawn(plant, tab, path, line):
 
 def test_an_alarm_of_a_valve_without_alarm_services_is_answered(plant, tab):
     """An identifier beside twenty others offers none; it follows the file of the history."""
-    history = HistoryFile(plant.folder / "valve_friction_ros" / "history.sqlite")
     node = "/crowd/fv_1/identifier"
     shown = Condition(Level.ERROR, StatusSignal.FAILURE, "excess friction")
     valve = KeptValve(node, "CROWD-1")
-    follow_alarms(history, valve, {AlarmKind.FRICTION_HIGH: shown}, time.time_ns())
+    follow_alarms(plant.history, valve, {AlarmKind.FRICTION_HIGH: shown}, time.time_ns())
     page = tab.open("/alarms?area=/crowd")
     row = page.locator("tr", has_text="friction high")
     row.get_by_role("button", name="Acknowledge").click()
     page.get_by_label("Your name").fill("A. Operator")
     page.get_by_role("button", name="Confirm").click()
     row.get_by_text("acknowledged by A. Operator").wait_for()
-    assert read_alarms(history, node)[AlarmKind.FRICTION_HIGH].state is AlarmState.ACKNOWLEDGED
+    assert (
+        read_alarms(plant.history, node)[AlarmKind.FRICTION_HIGH].state is AlarmState.ACKNOWLEDGED
+    )
 
 
 def test_what_cannot_be_called_says_so(tab):

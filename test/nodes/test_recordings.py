@@ -12,8 +12,6 @@
 import json
 import math
 import re
-import subprocess
-import sys
 import time
 from dataclasses import asdict
 from pathlib import Path
@@ -24,7 +22,16 @@ import numpy as np
 import pytest
 import yaml
 from faulty_identifier import FINISH, FULL, SLOW, faulty
-from live_nodes import NAMESPACE, NODE, PROJECT, SECOND, STREAM, SimulatedClock, stamp_of, stamps_of
+from live_nodes import (
+    NAMESPACE,
+    NODE,
+    SECOND,
+    STREAM,
+    SimulatedClock,
+    command,
+    stamp_of,
+    stamps_of,
+)
 from rclpy.duration import Duration
 from records import quick_record
 from rosbags.rosbag2 import Reader
@@ -50,15 +57,7 @@ class Run(NamedTuple):
 
 def identified(*arguments):
     """The one JSON object of the command, run as a person would."""
-    command = [sys.executable, "-m", "valve_friction_ros", "identify", "--json"]
-    done = subprocess.run(
-        [*command, *map(str, arguments)],
-        cwd=PROJECT,
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=False,
-    )
+    done = command("identify", "--json", *arguments)
     assert (done.returncode, done.stderr) == (0, "")
     return json.loads(done.stdout)
 

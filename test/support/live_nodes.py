@@ -443,6 +443,18 @@ class Client(Participant):
         return self.call(SetParametersAtomically, name, request).result
 
 
+def command(*arguments):
+    """Run the command as a person would; how it ended, and what it said."""
+    return subprocess.run(
+        [sys.executable, "-m", "valve_friction_ros", *map(str, arguments)],
+        cwd=PROJECT,
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
+
+
 class SimulatedClock:
     """The time on /clock; `now` is the last that it has shown, ns."""
 
