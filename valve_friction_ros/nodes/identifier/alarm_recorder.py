@@ -43,11 +43,6 @@ _STALE = 86_400.0
 """Age, s, from which an unfinished bag is considered a leftover of a killed node."""
 
 
-def _recording_name(valve: str, stamp: int, level: Level) -> str:
-    date = utc(stamp)
-    return f"alarm_{valve}_{date:%Y%m%dT%H%M%SZ}_{level.name}"
-
-
 def _size_of(recording: Path) -> int:
     return sum(one.stat().st_size for one in recording.iterdir())
 
@@ -244,7 +239,7 @@ class AlarmRecorder:
         node = self._node
         most, room = self._bounds()
         valve = valve_name(node)
-        name = _recording_name(valve, rise.time, rise.level)
+        name = f"alarm_{valve}_{utc(rise.time):%Y%m%dT%H%M%SZ}_{rise.level.name}"
         write = bag_writer(node, self._monitor.settings.valve, names)
 
         def write_bag() -> AlarmRecording:
