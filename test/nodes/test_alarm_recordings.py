@@ -30,7 +30,7 @@ from valve_friction_ros.history import (
     keep_alarm_recording,
 )
 from valve_friction_ros.model import BENCH_VALVE, HIGH_FRICTION
-from valve_friction_ros.nodes.identifier.alarm_recorder import _LATE
+from valve_friction_ros.nodes.identifier.recordings import _LATE
 
 TICK = 1.0
 """Period of the diagnostics, s."""

@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 
 from valve_friction_ros.identification import RefusalError
-from valve_friction_ros.nodes.identifier.alarm_recorder import remove_oldest
+from valve_friction_ros.nodes.identifier.recordings import remove_oldest
 from valve_friction_ros.nodes.plumbing.output_folder import (
     OutputFolder,
     folder_of,

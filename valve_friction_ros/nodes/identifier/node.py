@@ -38,12 +38,11 @@ from valve_friction_ros.health import (
 from valve_friction_ros.health.measured import DIFFERENCES
 from valve_friction_ros.identification import STATED, RefusalError, require_valve_units
 from valve_friction_ros.nodes.identifier.alarm_board import AlarmBoard
-from valve_friction_ros.nodes.identifier.alarm_recorder import AlarmRecorder
 from valve_friction_ros.nodes.identifier.alerts import Alerts, FaultLog, LevelLog, webhook_from
 from valve_friction_ros.nodes.identifier.baseline_in_force import BaselineInForce, baseline_from
 from valve_friction_ros.nodes.identifier.evidence_watch import EvidenceWatch
 from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
-from valve_friction_ros.nodes.identifier.requested_files import BagSaver, ReportWriter
+from valve_friction_ros.nodes.identifier.recordings import AlarmRecorder, BagSaver, ReportWriter
 from valve_friction_ros.nodes.identifier.response_watch import ResponseWatch, StandstillWatch
 from valve_friction_ros.nodes.identifier.status import (
     EstimateTopic,
