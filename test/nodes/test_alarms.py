@@ -122,8 +122,7 @@ def test_stamps_of_a_time_to_come(live, history, tmp_path):
     for place, stamp in enumerate((now + DAY, now - DAY)):
         one = AlarmRecording(stamp, Level.WARN, tmp_path / f"{place}", "excess friction")
         keep_alarm_recording(history, VALVE, one, days=365.0)
-    live.start_identifier()
-    client = live.client
+    client = live.client_of_identifier()
     status = client.next_status()
     assert status.level == ERROR
     assert status.message.endswith(
@@ -192,8 +191,7 @@ def test_rows_that_cannot_be_read_stop_no_node(live, history, damage):
 
 
 def test_a_node_without_a_history_says_so_and_keeps_nothing(live, history):
-    live.start_identifier({"history_file": "''"})
-    client = live.client
+    client = live.client_of_identifier({"history_file": "''"})
     told = client.status_values()["history"]
     assert told == (
         "none, because history_file is empty: diagnosis and baseline are lost when this node stops"
@@ -256,8 +254,7 @@ def test_the_baseline_is_guarded_and_restored(live, history):
 
 
 def test_a_baseline_of_the_parameter_is_replaced_and_comes_back(live, history):
-    live.start_identifier({"baseline_coulomb_friction": 140.0})
-    client = live.client
+    client = live.client_of_identifier({"baseline_coulomb_friction": 140.0})
     client.identified(HEALTHY)
     given = Baseline(140.0)
     assert client.trigger("set_baseline").message == (f"baseline: {OLD}; previous: {given}{TAKEN}")
@@ -351,8 +348,9 @@ def test_a_life_of_an_alarm(live, history):
 
 def test_nobody_is_alerted_while_an_alarm_is_shelved(live):
     with Receiver() as receiver:
-        live.start_identifier({**KNOWN, "webhook_url": receiver.url, "webhook_period": 0.0})
-        client = live.client
+        client = live.client_of_identifier(
+            {**KNOWN, "webhook_url": receiver.url, "webhook_period": 0.0}
+        )
         client.identified(TIGHT)
         client.wait_until(lambda: len(receiver.requests) == 1, "an alert")
         assert ask(client, "shelve").success
@@ -374,8 +372,7 @@ def test_nobody_is_alerted_while_an_alarm_is_shelved(live):
 
 def test_what_another_process_keeps_is_seen(live, history):
     """The dashboard acknowledges many alarms at once, in the file."""
-    live.start_identifier(KNOWN)
-    client = live.client
+    client = live.client_of_identifier(KNOWN)
     client.identified(TIGHT)
     state(client, "friction_high", "unacknowledged")
     (valve,) = history.valves()

@@ -34,6 +34,10 @@ def secrets(monkeypatch):
         monkeypatch.setenv(name, value)
 
 
+def posting_to(receiver):
+    return {**KNOWN, "webhook_url": receiver.url, "webhook_period": 0.0}
+
+
 def changes(receiver):
     return [(body["old_level"], body["new_level"]) for body in receiver.bodies]
 
@@ -78,7 +82,7 @@ def test_each_change_of_level_is_posted_once(live, tmp_path, monkeypatch):
 
 def test_a_refused_alert_is_upkeep_and_no_alert(live):
     with Receiver(answer=answer_with(404)) as receiver:
-        node = live.start_identifier({**KNOWN, "webhook_url": receiver.url, "webhook_period": 0.0})
+        node = live.start_identifier(posting_to(receiver))
         client = live.client
         client.identified(TIGHT)
         client.wait_until(lambda: len(receiver.requests) == 1, "an alert")
@@ -116,8 +120,9 @@ def test_a_receiver_that_hangs_holds_up_neither_diagnostics_nor_the_end(live):
 
 def test_a_flapping_valve_posts_one_change_a_period(live):
     with Receiver() as receiver:
-        live.start_identifier({**KNOWN, "webhook_url": receiver.url, "webhook_period": 3600.0})
-        client = live.client
+        client = live.client_of_identifier(
+            {**KNOWN, "webhook_url": receiver.url, "webhook_period": 3600.0}
+        )
         for record, level in ((TIGHT, ERROR), (HEALTHY, OK)) * 2:
             client.identified(record)
             client.next_status(lambda one, level=level: one.level == level, "the level")
@@ -129,7 +134,7 @@ def test_a_flapping_valve_posts_one_change_a_period(live):
 
 def test_silence_of_the_inputs_is_posted(live):
     with Receiver() as receiver:
-        live.start_identifier({**KNOWN, "webhook_url": receiver.url, "webhook_period": 0.0})
+        live.start_identifier(posting_to(receiver))
         live.client.identified(HEALTHY)
         assert live.client.set_together(NODE, {"input_timeout": 0.5}).successful
         live.client.wait_until(lambda: receiver.requests, "silence")
@@ -161,7 +166,7 @@ def test_what_is_found_on_a_valve_is_told_once_whatever_restarts(live, history):
     history.path.parent.mkdir(parents=True, exist_ok=True)
     keep_usage(history, KeptValve(NODE, "FV-101"), "run", [used])
     with Receiver() as receiver:
-        chosen = {**KNOWN, "webhook_url": receiver.url, "webhook_period": 0.0}
+        chosen = posting_to(receiver)
         client = live.client
         for _ in range(2):
             node = live.start_identifier({**chosen, "reversal_limit": 20.0})
@@ -211,8 +216,7 @@ def test_what_waited_at_a_kill_is_told_after_the_restart(live, history):
 
 def test_one_digest_a_day_lists_the_alarms(live):
     with Receiver() as receiver:
-        live.start_identifier({**KNOWN, "webhook_url": receiver.url, "webhook_period": 0.0})
-        client = live.client
+        client = live.client_of_identifier(posting_to(receiver))
         client.identified(TIGHT)
         client.wait_until(lambda: len(receiver.requests) == 1, "an alert")
         soon = (time.time() + 5.0) % 86_400 / 3600

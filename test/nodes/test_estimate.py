@@ -28,8 +28,7 @@ OF_THE_INPUTS = {"estimate_age [s]", *BUFFERED}
 
 
 def test_one_message_at_each_change(live):
-    live.start_identifier({"valve_tag": "FV-101/A"})
-    client = live.client
+    client = live.client_of_identifier({"valve_tag": "FV-101/A"})
     heard = client.listen(DiagnosticStatus, TOPIC)
     client.wait_until(lambda: heard, "the message of the start")
     assert values_of(heard[-1])["estimate_valid"] == "false"
@@ -64,8 +63,7 @@ def test_one_message_at_each_change(live):
 def test_the_numbers_in_one_stamped_message(live):
     """All of an identification, by name; what nobody asks for is no topic of the graph."""
     asked = dict.fromkeys(("estimate_topic", "number_topics"), False) | {"result_topic": True}
-    live.start_identifier(asked)
-    client = live.client
+    client = live.client_of_identifier(asked)
     client.identified(quick_record())
     result = client.latched(JointState, f"{NAMESPACE}/identifier/result")
     shown = client.last_values()
@@ -158,8 +156,7 @@ def test_it_identifies_without_being_asked(live, history):
 
 
 def test_the_period_is_changed_while_it_runs(live):
-    live.start_identifier()
-    client = live.client
+    client = live.client_of_identifier()
     assert "scheduled_skip" not in client.status_values()
     assert client.set_together(NODE, {"period": 0.1}).successful
     client.next_status(skipped("no samples"), "a skip")
@@ -170,8 +167,7 @@ def test_the_period_is_changed_while_it_runs(live):
 
 def test_by_simulated_time(live):
     """The clock of a simulation or of a bag, not the wall's."""
-    live.start_identifier({"period": 100.0, "use_sim_time": True})
-    client = live.client
+    client = live.client_of_identifier({"period": 100.0, "use_sim_time": True})
     clock = SimulatedClock(client)
     clock.now = 1_000 * SECOND
 

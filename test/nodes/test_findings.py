@@ -26,8 +26,7 @@ LIMITS = {"warn_ratio": 1.5, "error_ratio": 2.0, "low_ratio": 0.5}
 @pytest.fixture(scope="module")
 def healthy(shared):
     """An identifier whose baseline is its own estimate of the healthy valve."""
-    shared.start_identifier()
-    client = shared.client
+    client = shared.client_of_identifier()
     refused = client.trigger("set_baseline")
     client.identified(quick_record())
     accepted = client.trigger("set_baseline")
@@ -249,8 +248,7 @@ def test_a_restored_baseline_brings_all_its_numbers_back(live):
 
 
 def test_a_limit_is_a_parameter_and_a_given_friction_says_nothing_of_the_spring(live):
-    live.start_identifier({"spring_change": 0.5, "spring_failure": 0.6})
-    client = live.client
+    client = live.client_of_identifier({"spring_change": 0.5, "spring_failure": 0.6})
     client.set_baseline(HEALTHY)
     client.identified(WEAK)
     assert client.statuses[-1][1].level == OK
@@ -271,8 +269,7 @@ def still(place, pressures, begin):
 
 def test_a_seized_stem_is_an_alarm_until_it_moves(live):
     record = quick_record()
-    live.start_identifier({"window": 3600.0})
-    client = live.client
+    client = live.client_of_identifier({"window": 3600.0})
     client.set_baseline(record)
     assert client.next_status().level == OK
     middle = 0.5 * float(record.position.min() + record.position.max())
@@ -297,8 +294,7 @@ UNSTATED = dict.fromkeys(
 
 
 def test_what_nobody_has_stated_is_said_until_somebody_does(live):
-    live.start_identifier(UNSTATED)
-    client = live.client
+    client = live.client_of_identifier(UNSTATED)
     assert client.parameters(NODE, *UNSTATED) == [None] * len(UNSTATED)
     client.identified(quick_record())
     values = client.last_values()
@@ -320,8 +316,7 @@ def test_what_nobody_has_stated_is_said_until_somebody_does(live):
 def test_stated_data_are_compared_with_the_record(live):
     """The file of a valve says it as the file of a command does."""
     spring = LOW_FRICTION.spring_constant
-    live.start_identifier({"spring_constant": spring / 2, "mass": 1.542})
-    client = live.client
+    client = live.client_of_identifier({"spring_constant": spring / 2, "mass": 1.542})
     client.identified(quick_record())
     values = client.last_values()
     assert ("N/m from the record but stated as 102500 N/m: check diaphragm_area") in values[

@@ -47,8 +47,7 @@ def first_values(live):
 
 
 def test_success_and_refusal_are_kept(live, history):
-    live.start_identifier({"valve_tag": "FV-101", "window": 70.0})
-    client = live.client
+    client = live.client_of_identifier({"valve_tag": "FV-101", "window": 70.0})
     refusal = client.trigger("identify").message
     client.identified(RECORD)
     entries = history.entries()

@@ -26,8 +26,7 @@ ONE_HOUR = 3600 * SECOND
 
 @pytest.fixture(scope="module")
 def identifier(shared):
-    shared.start_identifier()
-    return shared.client
+    return shared.client_of_identifier()
 
 
 @pytest.fixture
@@ -207,8 +206,7 @@ def test_the_log_tells_a_clearing_right_after_a_bad_sample(live):
 @pytest.mark.parametrize("late", ["pressure", "stem"])
 def test_a_record_that_ended_long_ago_is_refused(live, late):
     """By the node's clock, whatever its stamps: of both signals, or of one that fell silent."""
-    live.start_identifier({"use_sim_time": True, "input_timeout": 3.0})
-    client = live.client
+    client = live.client_of_identifier({"use_sim_time": True, "input_timeout": 3.0})
     clock = SimulatedClock(client)
 
     def set_clock(second):

@@ -43,8 +43,7 @@ BIAS = 1.13e-3
 @pytest.fixture(scope="module")
 def bench(shared):
     """Identify two periods of a square wave; return client, core's assessment, answers."""
-    shared.start_identifier({"method": "bench", "position_bias": BIAS})
-    client = shared.client
+    client = shared.client_of_identifier({"method": "bench", "position_bias": BIAS})
     early = client.listen(Float64, f"{NAMESPACE}/identifier/friction/coulomb_friction")
     record = bench_record()
     client.fill(record)

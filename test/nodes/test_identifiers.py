@@ -211,8 +211,7 @@ def test_a_storm_on_one_valve_is_bounded_work_and_leaves_the_other_its_turn(stor
 def test_lost_messages_are_a_warning_with_their_share_until_it_is_over(live):
     """A queue of ten takes a burst of a thousand."""
     depth = "qos_overrides./fv_101/actuator_pressure.subscription.depth"
-    live.start_identifier({depth: 10})
-    client = live.client
+    client = live.client_of_identifier({depth: 10})
     client.send_pressure(START, 1e5)
     client.next_status(lambda one: values_of(one)["buffered_pressures"] == "1", "the first")
     for number in range(1, 1001):

@@ -85,8 +85,7 @@ def test_usage_is_shown_kept_and_goes_on(live, history):
 
 
 def test_a_renewed_packing_counts_anew(live, history):
-    live.start_identifier()
-    client = live.client
+    client = live.client_of_identifier()
     after = send(client, strokes(8))
     shown(client, "reversals", "7")
     answer = client.trigger("reset_usage")
@@ -151,8 +150,7 @@ def test_earlier_runs_that_cannot_be_read_at_first(live, tmp_path):
     blocked = tmp_path / "blocked"
     blocked.touch()
     history = HistoryFile(blocked / "history.sqlite")
-    live.start_identifier({"history_file": history.path})
-    client = live.client
+    client = live.client_of_identifier({"history_file": history.path})
     after = send(client, strokes(8))
     values = shown(client, "reversals", "7")
     assert values["usage"] == "for this run only, because the history cannot be read"
@@ -238,8 +236,7 @@ def test_the_newer_of_identification_and_moves_leads_and_is_the_baseline(live, h
     packing = replace(
         LOW_FRICTION, coulomb_friction=300.0, static_friction=300.0, viscous_friction=500.0
     )
-    live.start_identifier(SECURE)
-    client = live.client
+    client = live.client_of_identifier(SECURE)
     client.identified(quick_record(packing))
     answer = client.trigger("set_baseline")
     assert answer.message.endswith("(by the identification of 2023-11-14 22:13 UTC)")
@@ -265,8 +262,7 @@ def test_the_newer_of_identification_and_moves_leads_and_is_the_baseline(live, h
 
 
 def test_a_renewed_packing_a_wrong_stamp_and_another_actuator(live):
-    live.start_identifier(SECURE)
-    client = live.client
+    client = live.client_of_identifier(SECURE)
     serve(client, 0, 300.0)
     before = client.status_values(
         lambda status: number(values_of(status), "reference [N]") > 0, "a reference"
@@ -328,8 +324,7 @@ def answer(dead_time, lag):
 
 @pytest.mark.parametrize(("unit", "scale"), [("m", TRAVEL), ("'%'", 100.0)])
 def test_moves_in_service(live, unit, scale):
-    live.start_identifier({"command_unit": unit, "window": 3600.0})
-    client = live.client
+    client = live.client_of_identifier({"command_unit": unit, "window": 3600.0})
     assert "moves" not in client.status_values()
     commander(live)(scale)
     stamps, pressure, position = answer(1.0, 0.5)

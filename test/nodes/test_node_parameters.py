@@ -100,8 +100,7 @@ BAD_CHANGES = [  # changes, words of the reason
 
 @pytest.fixture(scope="module")
 def client(shared):
-    shared.start_identifier()
-    return shared.client
+    return shared.client_of_identifier()
 
 
 def range_of(descriptor):
@@ -246,8 +245,7 @@ def test_numbers_may_be_texts(client, text):
 
 def test_simulated_time(live):
     """Without a clock it is missed; a clock that is set back empties the buffer."""
-    live.start_identifier()
-    client = live.client
+    client = live.client_of_identifier()
     assert client.set_together(NODE, {"use_sim_time": True}).successful
     status = client.next_status(lambda one: "no time on /clock" in one.message, "a warning")
     assert status.level == WARN

@@ -142,8 +142,7 @@ def begin_identification(client):
 
 def test_long_identification_loses_no_sample(live, tmp_path):
     """What arrives while an identification runs is taken at once, and identified by the next."""
-    live.start_identifier({"method": "bench"}, script=faulty("slow"))
-    client = live.client
+    client = live.client_of_identifier({"method": "bench"}, script=faulty("slow"))
     whole = simulated(SineWave(period=5.0).sample(np.arange(1000) / 100), 0.01)
     begin, rest = slice(500), slice(500, 1000)
     stamps = stamps_of(whole)

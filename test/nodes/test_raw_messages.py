@@ -88,14 +88,15 @@ def joint_states(draw, count):
     return [message() for _ in range(count)]
 
 
-@given(frame=WORDS, samples=st.lists(st.tuples(TIMES, NUMBERS, NUMBERS), max_size=20))
-def test_pressures_of_one_publisher(frame, samples):
-    check_pressures(serialised(pressure(at, value, frame, more) for at, value, more in samples))
-
-
-@given(samples=st.lists(st.tuples(TIMES, NUMBERS, WORDS), max_size=8))
-def test_pressures_of_several_publishers(samples):
-    check_pressures(serialised(pressure(*sample) for sample in samples))
+@pytest.mark.parametrize("publishers", ["one", "several"])
+@given(frame=WORDS, samples=st.lists(st.tuples(TIMES, NUMBERS, WORDS, NUMBERS), max_size=20))
+def test_pressures(publishers, frame, samples):
+    check_pressures(
+        serialised(
+            pressure(at, value, frame if publishers == "one" else own, more)
+            for at, value, own, more in samples
+        )
+    )
 
 
 @settings(deadline=None)

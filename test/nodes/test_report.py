@@ -102,8 +102,7 @@ def test_the_trend_and_the_signature_of_the_baseline_are_those_of_the_history(li
         friction = 150.0 + 2.0 * (35 - days)
         kept.add(success(now - days * DAY, friction, 2.0, valve=valve, method="plant"))
     places = {"report_folder": str(tmp_path), "history_file": str(kept.path)}
-    live.start_identifier({**places})
-    client = live.client
+    client = live.client_of_identifier({**places})
     client.identified(quick_record(HIGH_FRICTION))
     _, page = report(client)
     assert page.said("h2")[2:4] == ["Friction compared with its baseline", "Trend"]
