@@ -7,15 +7,19 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The simulated valve and the source of its pressure over topics: the numbers of the model."""
+"""A bench over topics: the simulated valve, the source of its pressure, and stroke tests played."""
 
+import json
 import math
 
 import numpy as np
 import pytest
-from live_nodes import NAMESPACE, SECOND, START, STREAM, stamp_of
+from live_nodes import LATCHED, NAMESPACE, SECOND, START, STREAM, stamp_of
 from sensor_msgs.msg import FluidPressure, JointState
+from std_msgs.msg import String
 
+from valve_friction_ros.commands.plan_test import player, write_test
+from valve_friction_ros.identification import IdentificationSettings
 from valve_friction_ros.model import (
     BENCH_VALVE,
     GRAPHITE_PACKING,
@@ -28,6 +32,7 @@ from valve_friction_ros.model import (
     converter_response,
     simulate,
 )
+from valve_friction_ros.planning import Conditions, Limits, known_friction, plan_test
 
 NODE = f"{NAMESPACE}/simulator"
 PERIOD = 0.01
@@ -253,3 +258,131 @@ def test_jitter_is_of_the_time_alone_and_bounded(live):
     assert np.abs(off).max() <= 1.001 * jitter
     assert off.std() == pytest.approx(jitter / np.sqrt(3), rel=0.1)
     assert np.all(np.diff(stamps) > 0)
+
+
+HOME = 1e5
+ROWS = ((0.0, HOME), (0.5, HOME), (2.5, 1.4e5), (600.0, 1.4e5))
+PLAYER = f"{NAMESPACE}/stroke_player"
+
+
+@pytest.fixture
+def stroke_player(live, tmp_path):
+    """A player; `send_signals` keeps its send_signals coming, at the position `live.position`."""
+    file = tmp_path / "test.csv"
+    file.write_text("time_s,pressure_pa\n" + "".join(f"{t},{p}\n" for t, p in ROWS))
+    live.set_points = live.client.listen(FluidPressure, f"{NAMESPACE}/pressure_set_point", STREAM)
+    live.states = live.client.listen(String, f"{PLAYER}/state", LATCHED)
+    parameters = {"file": str(file), "file_minimum": 0.9e5, "file_maximum": 1.5e5, "silence": 5.0,
+                  "position_minimum": 0.002, "position_maximum": 0.02}  # fmt: skip
+    live.player = live.start("stroke_player", parameters)
+    live.position, live.sent = 0.01, 0
+    live.client.connect()
+    return live
+
+
+def send_signals(live):
+    """Send a sample of each signal."""
+    live.sent += 1
+    live.client.send_pressure(START + live.sent * SECOND // 100, 1.1e5)
+    live.client.send_stem(START + live.sent * SECOND // 100, live.position)
+
+
+def wait(live, condition, what):
+    """Wait while the send_signals come."""
+
+    def met():
+        send_signals(live)
+        return condition()
+
+    live.client.wait_until(met, what)
+
+
+def last(live):
+    return live.set_points[-1].fluid_pressure if live.set_points else None
+
+
+def test_it_plays_when_asked_and_goes_back_by_limit_and_by_its_end(stroke_player):
+    live = stroke_player
+    assert not live.client.trigger("start", PLAYER).success  # no signal has come
+    wait(live, lambda: live.sent > 50, "send_signals")
+    assert last(live) is None  # and nothing begins by itself
+    answer = live.client.trigger("start", PLAYER)
+    assert answer.success, answer.message
+    wait(live, lambda: last(live) == 1.4e5, "the highest set point")
+    values = [one.fluid_pressure for one in live.set_points]
+    assert values[0] == HOME
+    assert values == sorted(values)
+    live.position = 0.0201
+    wait(live, lambda: last(live) == HOME, "the way back")
+    wait(live, lambda: "beyond its limit of 0.02 m" in live.states[-1].data, "the state")
+    live.position = 0.01
+    wait(live, lambda: live.sent % 50 == 0, "good send_signals")
+    assert live.client.trigger("start", PLAYER).success
+    wait(live, lambda: last(live) > 1.2e5, "set points")
+    live.player.interrupt()
+    live.player.require_good_end()
+    live.client.drain()
+    assert last(live) == HOME
+
+
+TEST_RATE, TEST_SPEED = 50.0, 4.0
+NAMES = ("coulomb_friction", "sliding_friction")
+
+
+@pytest.fixture(scope="module")
+def plan():
+    """Planned for a friction that is two thirds of the true one."""
+    true = HIGH_FRICTION
+    frictions = known_friction(
+        true.coulomb_friction / 1.5,
+        (true.spring_constant, true.spring_preload),
+        true.mass,
+        viscous_friction=true.viscous_friction / 1.5,
+        factor=1.5,
+    )
+    settings = IdentificationSettings(assumed_mass=1.6)
+    return plan_test(BENCH_VALVE, frictions, Limits(duration=30.0), Conditions(TEST_RATE), settings)
+
+
+def test_what_is_reported_is_what_was_promised(live, plan, tmp_path):
+    file = tmp_path / "stroke_test.csv"
+    write_test(file, plan)
+    valve = {
+        "diaphragm_area": BENCH_VALVE.diaphragm_area,
+        "pressure_reference": BENCH_VALVE.pressure_reference,
+        "travel": BENCH_VALVE.travel,
+    }
+    names = (
+        "mass",
+        "viscous_friction",
+        "coulomb_friction",
+        "static_friction",
+        "spring_constant",
+        "spring_preload",
+    )
+    true = {name: getattr(HIGH_FRICTION, name) for name in names}
+    live.start("simulator", {**valve, **true, "position_noise": 10e-6})
+    live.start_identifier({**valve, "window": 40.0, "assumed_mass": 1.6})
+    live.client.wait_until(
+        lambda: live.client.node.count_publishers(f"{NAMESPACE}/stem_state"), "the stem"
+    )
+    heard = live.client.listen(JointState, f"{NAMESPACE}/stem_state", STREAM)
+    played = {"sample_rate": TEST_RATE, "speed": TEST_SPEED, "pressure_noise": 100.0}
+    live.start("pressure_source", player(plan, file) | played)
+
+    def has_ended():
+        stamps = [stamp_of(message.header.stamp) for message in heard[:1] + heard[-1:]]
+        return stamps and stamps[1] - stamps[0] >= (plan.test.duration - 1.0) * SECOND
+
+    live.client.wait_until(has_ended, "the end of the test")
+    positions = [message.position[0] / BENCH_VALVE.travel for message in heard]
+    assert 0.19 < min(positions) < 0.45
+    assert 0.55 < max(positions) < 0.81
+    response = live.client.trigger("identify")
+    assert response.success, response.message
+    promised = plan.forecasts[-1]
+    assert promised.parameters.coulomb_friction == pytest.approx(606.0)
+    values, widths = live.client.friction(*NAMES), live.client.half_widths(*NAMES)
+    assert abs(values["coulomb_friction"] - 606.0) <= widths["coulomb_friction"]
+    for name in NAMES:
+        assert 0.4 < widths[name] / promised.half_widths[name] < 2.5, json.dumps(widths)
