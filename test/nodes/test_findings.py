@@ -16,8 +16,6 @@ import pytest
 from live_nodes import ERROR, NODE, OK, SECOND, START, WARN, values_of
 from records import quick_record, simulated, stroked_record
 
-from valve_friction_ros.health import Baseline
-from valve_friction_ros.identification import identify
 from valve_friction_ros.model import BENCH_VALVE, HIGH_FRICTION, LOW_FRICTION, SensorNoise
 
 LIMITS = {"warn_ratio": 1.5, "error_ratio": 2.0, "low_ratio": 0.5}
@@ -27,35 +25,20 @@ LIMITS = {"warn_ratio": 1.5, "error_ratio": 2.0, "low_ratio": 0.5}
 def healthy(shared):
     """An identifier whose baseline is its own estimate of the healthy valve."""
     client = shared.client_of_identifier()
-    refused = client.trigger("set_baseline")
-    client.identified(quick_record())
-    accepted = client.trigger("set_baseline")
-    return client, refused, accepted
+    client.set_baseline(quick_record())
+    return client
 
 
 @pytest.fixture
 def client(healthy):
-    client, *_ = healthy
-    assert client.set_together(NODE, LIMITS).successful
-    return client
+    assert healthy.set_together(NODE, LIMITS).successful
+    return healthy
 
 
 def valve_with(coulomb_friction):
     return replace(
         LOW_FRICTION, coulomb_friction=coulomb_friction, static_friction=coulomb_friction
     )
-
-
-def test_baseline_needs_an_estimate(healthy):
-    _, refused, accepted = healthy
-    assert not refused.success
-    assert "the valve has no result" in refused.message
-    assert accepted.success
-    result = identify(quick_record(), BENCH_VALVE)
-    taken = "by the identification of 2023-11-14 22:13 UTC"
-    assert accepted.message == f"baseline: {Baseline.of(result)}; previous: none ({taken})"
-    healthy = result.parameters["coulomb_friction"]
-    assert healthy.interval[0] < 152.7 < healthy.interval[1]
 
 
 @pytest.mark.parametrize(

@@ -337,16 +337,8 @@ def test_it_identifies_without_being_asked(live, history):
     assert not client.trigger("identify").success
     assert "the latest identification was refused" in client.next_status().message
     assert history.entries()[-1].refusal
-
-
-def test_the_period_is_changed_while_it_runs(live):
-    client = live.client_of_identifier()
-    assert "scheduled_skip" not in client.status_values()
-    assert client.set_together(NODE, {"period": 0.1}).successful
-    client.next_status(skipped("no samples"), "a skip")
     assert client.set_together(NODE, {"period": 0.0}).successful
     client.next_status(lambda status: "scheduled_skip" not in values_of(status), "the end of it")
-    assert not client.set_together(NODE, {"period": -1.0}).successful
 
 
 def test_by_simulated_time(live):

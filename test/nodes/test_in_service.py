@@ -192,6 +192,7 @@ def test_it_adds_up_and_survives_a_kill(live, history):
 
     refused = client.trigger("set_baseline")
     assert not refused.success
+    assert refused.message.startswith("the valve has no result")
     assert "moves in service cannot be the baseline yet: 0 moves up and 0 down" in refused.message
     serve(client, 0, 300.0)
     values = client.status_values(

@@ -61,6 +61,7 @@ BAD_CHANGES = [  # changes, words of the reason
     ({"mass": 1}, "mass: expected 'Type.DOUBLE' got 'Type.INTEGER'"),
     ({"window": -1.0}, "window"),
     ({"input_timeout": 0.0}, "input_timeout"),
+    ({"period": -1.0}, "period"),
     ({"derivative_window": 30}, "window must be odd"),
     ({"polynomial_order": 30}, "polynomial_order"),
     ({"polynomial_order": 20, "derivative_window": 21}, "at least order + 2 = 22"),
