@@ -58,10 +58,12 @@ def pressure_from_file(path: Path, values: Mapping[str, Any]) -> SampledPressure
     columns = read_columns(path, ("time_s", "pressure_pa"))
     signal = SampledPressure(columns["time_s"], columns["pressure_pa"])
     lowest, highest = float(signal.pressures.min()), float(signal.pressures.max())
+    rates = np.abs(np.diff(signal.pressures) / np.diff(signal.times))
+    rate = float(np.max(rates, initial=0.0))
     for name, breaks, found, unit in (
         ("file_minimum", lowest < values["file_minimum"], lowest, "Pa"),
         ("file_maximum", highest > values["file_maximum"], highest, "Pa"),
-        ("file_rate", (rate := _largest_rate(signal)) > values["file_rate"], rate, "Pa/s"),
+        ("file_rate", rate > values["file_rate"], rate, "Pa/s"),
     ):
         if breaks:
             raise ValueError(
@@ -69,11 +71,6 @@ def pressure_from_file(path: Path, values: Mapping[str, Any]) -> SampledPressure
                 "is played; plan the test again, or change the limit"
             )
     return signal
-
-
-def _largest_rate(signal: SampledPressure) -> float:
-    rates = np.abs(np.diff(signal.pressures) / np.diff(signal.times))
-    return float(np.max(rates, initial=0.0))
 
 
 def _excitation(values: Mapping[str, Any]) -> Excitation:

@@ -80,6 +80,8 @@ class AlarmBoard:
 
     Attributes
     ----------
+    alarms : dict of AlarmKind to Alarm
+        The alarms by kind, without those never raised.
     is_requested : bool
         Whether somebody asked for the next identification: its 95 % interval then decides.
     """
@@ -93,7 +95,7 @@ class AlarmBoard:
     ) -> None:
         self._node, self._monitor, self._history = node, monitor, history
         self._evidence = evidence
-        self._alarms = history.look_up(database.read_alarms) or {}
+        self.alarms: dict[AlarmKind, Alarm] = history.look_up(database.read_alarms) or {}
         moves = evidence.evidence
         self._hold = FrictionHold(
             {side: self._condition(kind) for side, kind in ALARM_OF_SIDE.items()},
@@ -118,13 +120,8 @@ class AlarmBoard:
             create_trigger_service(node, f"~/{name}", partial(self._ask, action))
         create_service(node, SetBool, "~/out_of_service", self._switch)
 
-    @property
-    def alarms(self) -> Mapping[AlarmKind, Alarm]:
-        """The alarms by kind, without those never raised."""
-        return self._alarms
-
     def _condition(self, kind: AlarmKind) -> Condition:
-        return self._alarms[kind].condition if kind in self._alarms else NO_CONDITION
+        return self.alarms[kind].condition if kind in self.alarms else NO_CONDITION
 
     # Conditions of the valve
 
@@ -156,7 +153,7 @@ class AlarmBoard:
         for kind, condition in shown.items():
             delay = self._delays[kind] = self._delays[kind].seen(condition, now)
             conditions[kind] = delay.shown
-        if events := all_followed(self._alarms, conditions, time):
+        if events := all_followed(self.alarms, conditions, time):
             self._take(events)
             valve, days = self._history.valve, self._days
             self._under_way = _Step(
@@ -169,7 +166,7 @@ class AlarmBoard:
         return float(self._node.get_parameter("history_days").value)
 
     def _take(self, events: Sequence[AlarmEvent]) -> None:
-        self._alarms |= {one.alarm.kind: one.alarm for one in events}
+        self.alarms |= {one.alarm.kind: one.alarm for one in events}
         for one in events:
             by = f" by {one.who}" if one.who else ""
             said = one.text or (one.alarm.message if one.alarm.is_active else "")
@@ -182,10 +179,10 @@ class AlarmBoard:
         """Adopt the alarms of the history once our change is written: others write there too."""
         step = self._under_way
         if step is not None and step.made is not None:
-            self._alarms = dict(step.made.alarms)
+            self.alarms = dict(step.made.alarms)
             self._under_way = None
         if self._under_way is None:
-            self._alarms |= self._history.alarm_news()
+            self.alarms |= self._history.alarm_news()
 
     def _frictions(self, renewal: int) -> dict[AlarmKind, Condition]:
         """Update the friction conditions after a new identification or new moves."""
@@ -247,9 +244,9 @@ class AlarmBoard:
         if step.refusal is not None:
             raise step.refusal
         if step.made is None:  # not stored, or not yet
-            events = all_requested(self._alarms, kind, request, time)
+            events = all_requested(self.alarms, kind, request, time)
         else:
-            events, self._alarms = step.made.events, dict(step.made.alarms)
+            events, self.alarms = step.made.events, dict(step.made.alarms)
             self._under_way = None  # it was made earlier
         self._take(events)
         return "; ".join(str(one.alarm) for one in events) + self._history.reservation
@@ -258,4 +255,4 @@ class AlarmBoard:
 
     def values(self) -> dict[str, str]:
         """Return the state of each alarm, with details of those that are not normal."""
-        return alarm_values(self._alarms)
+        return alarm_values(self.alarms)
