@@ -306,7 +306,7 @@ def test_a_baseline_is_set_only_when_it_is_agreed(tab):
 
 
 @pytest.mark.usefixtures("identified")
-def test_a_baseline_is_restored(tab):
+def test_a_baseline_is_restored_and_a_refusal_is_told(tab):
     page = tab.open(VALVE)
     page.locator(".vf-sub").first.wait_for()
     page.get_by_role("button", name="Restore baseline …").click()
@@ -316,11 +316,6 @@ def test_a_baseline_is_restored(tab):
     dialog.get_by_role("button", name="Restore baseline").click()
     page.get_by_text("Restore baseline: baseline: none").wait_for()
     page.locator(".vf-sub").first.wait_for(state="detached")
-
-
-@pytest.mark.usefixtures("identified")
-def test_a_refusal_is_told(tab):
-    page = tab.open(VALVE)
     page.get_by_role("button", name="Restore baseline …").click()
     page.locator(".vf-dialog").get_by_role("button", name="Restore baseline").click()
     page.get_by_text("there is no ~/set_baseline to undo").wait_for()

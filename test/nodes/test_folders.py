@@ -97,13 +97,12 @@ def test_trouble_with_the_disk_is_refused(tmp_path):
         raise OSError(errno.ENOSPC, "No space left on device")
 
 
-@pytest.mark.parametrize("bug", [RuntimeError("a bug"), ValueError("a bug")])
-def test_a_bug_is_not_blamed_on_the_folder(tmp_path, bug):
+def test_a_bug_is_not_blamed_on_the_folder(tmp_path):
     with (
-        pytest.raises(type(bug), match=r"^a bug$"),
+        pytest.raises(RuntimeError, match=r"^a bug$"),
         OutputFolder(str(tmp_path), "reports", "a report").opened(),
     ):
-        raise bug
+        raise RuntimeError("a bug")
 
 
 def test_a_link_has_the_name_that_it_has_wherever_it_leads(tmp_path):

@@ -249,20 +249,13 @@ def said(message="friction normal", age="1.0", ratio="1.02", count="5"):
     return DiagnosticStatus(name="/v/identifier: friction", message=message, values=values)
 
 
-def test_ages_and_counters_leave_the_mark():
+def test_a_mark_is_that_of_its_status_and_its_essential_keys():
+    """Ages and counters leave it, and so does a key within another one."""
     assert marks(said()) == marks(said(age="2.0", count="7"))
     assert marks(said()) != marks(said(ratio="1.03"))
     assert marks(said()) != marks(said(message="friction has grown"))
-
-
-def test_a_key_within_another_one_is_none():
     alike = DiagnosticStatus(values=[KeyValue(key="my friction_ratio", value="9")])
-    assert marks(alike) == marks(DiagnosticStatus())
-
-
-def test_each_status_of_an_array_has_its_own_mark():
-    empty, known = DiagnosticStatus(), said()
-    assert marks(empty, known) == [*marks(empty), *marks(known)]
+    assert marks(alike, said()) == [*marks(DiagnosticStatus()), *marks(said())]
 
 
 def test_bytes_between_the_texts_leave_the_mark():

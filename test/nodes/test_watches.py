@@ -191,25 +191,17 @@ def test_identifications_go_first_and_the_order_stays():
 
 
 def test_without_identifications_the_oldest_goes():
-    waiting = WaitingChanges(most=2)
-    for k in range(3):
-        waiting.add(change(k))
+    """A change waits once, and may go while it is made."""
+    waiting, made = WaitingChanges(most=2), change("made")
+    for one in (made, made, change(1), change(2)):
+        waiting.add(one)
     assert waiting.given_up == "1 other change"
+    waiting.remove(made)
     waiting.add(change("identified"), identification=True)
     assert waiting.given_up == "1 identification and 1 other change"
     waiting.forget_given_up()
     assert waiting.given_up == ""
     assert drained(waiting) == [1, 2]
-
-
-def test_a_change_waits_once_and_may_go_while_it_is_made():
-    waiting, one = WaitingChanges(most=1), change("made")
-    waiting.add(one)
-    waiting.add(one)
-    assert waiting.given_up == ""
-    waiting.add(change("next"))
-    waiting.remove(one)
-    assert drained(waiting) == ["next"]
 
 
 class TestHistoryThread:
