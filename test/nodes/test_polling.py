@@ -28,7 +28,7 @@ from valve_friction_ros.nodes.identifier.valve_inputs import ValveInputs
 from valve_friction_ros.nodes.plumbing.polled_node import (
     PolledNode,
     TurnExecutor,
-    create_trigger_service,
+    create_service,
 )
 from valve_friction_ros.nodes.plumbing.polled_subscription import PolledSubscription
 from valve_friction_ros.nodes.plumbing.qos import blocks, stream
@@ -174,7 +174,7 @@ class TestTurn:
             answered.append(1)
             return ""
 
-        create_trigger_service(node, "~/work", work)
+        create_service(node, "~/work", work)
         for _ in range(10):  # clients, each of which sends up to ten requests at once
             self.requests(client, 5)
         time.sleep(0.5)

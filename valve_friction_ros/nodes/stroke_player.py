@@ -25,7 +25,7 @@ from sensor_msgs.msg import FluidPressure, JointState
 from std_msgs.msg import String
 
 from valve_friction_ros.nodes.plumbing.parameters import declare_parameters, values_of
-from valve_friction_ros.nodes.plumbing.polled_node import PacedNode, create_trigger_service
+from valve_friction_ros.nodes.plumbing.polled_node import PacedNode, create_service
 from valve_friction_ros.nodes.plumbing.polled_subscription import PolledSubscription
 from valve_friction_ros.nodes.plumbing.qos import LATCHED, stream
 from valve_friction_ros.nodes.plumbing.running import run_nodes
@@ -74,8 +74,8 @@ class StrokePlayer(PacedNode):
         self._state = self.create_publisher(String, "~/state", LATCHED)
         self._pressures = PolledSubscription(self, FluidPressure, "actuator_pressure", stream())
         self._stems = PolledSubscription(self, JointState, "stem_state", stream())
-        create_trigger_service(self, "~/start", self._start, "not started")
-        create_trigger_service(self, "~/stop", self._stop)
+        create_service(self, "~/start", self._start, "not started")
+        create_service(self, "~/stop", self._stop)
 
     def close(self) -> None:
         """Return to the start of a running test, and wait for the delivery of this set point."""

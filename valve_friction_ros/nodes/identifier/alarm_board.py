@@ -11,7 +11,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rclpy.parameter import Parameter
 from std_srvs.srv import SetBool
@@ -41,7 +41,6 @@ from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
 from valve_friction_ros.nodes.plumbing.polled_node import (
     PolledNode,
     create_service,
-    create_trigger_service,
 )
 from valve_friction_ros.settings import NODES
 
@@ -117,8 +116,8 @@ class AlarmBoard:
             ("unshelve", AlarmAction.UNSHELVE),
             ("comment", AlarmAction.COMMENT),
         ):
-            create_trigger_service(node, f"~/{name}", partial(self._ask, action))
-        create_service(node, SetBool, "~/out_of_service", self._switch)
+            create_service(node, f"~/{name}", partial(self._ask, action))
+        create_service(node, "~/out_of_service", self._switch, kind=SetBool)
 
     def _condition(self, kind: AlarmKind) -> Condition:
         return self.alarms[kind].condition if kind in self.alarms else NO_CONDITION
@@ -216,8 +215,8 @@ class AlarmBoard:
 
     # Requests by people
 
-    async def _switch(self, request: Any) -> str:
-        return await self._ask(AlarmAction.TAKE_OUT if request.data else AlarmAction.PUT_BACK)
+    async def _switch(self, is_out: bool) -> str:
+        return await self._ask(AlarmAction.TAKE_OUT if is_out else AlarmAction.PUT_BACK)
 
     async def _ask(self, action: AlarmAction) -> str:
         """Carry out the request in the parameters, which apply to one request."""

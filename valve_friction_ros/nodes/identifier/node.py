@@ -68,7 +68,7 @@ from valve_friction_ros.nodes.plumbing.parameters import (
     valve_from,
     warn_of_columns,
 )
-from valve_friction_ros.nodes.plumbing.polled_node import create_trigger_service
+from valve_friction_ros.nodes.plumbing.polled_node import create_service
 from valve_friction_ros.nodes.plumbing.running import run_nodes
 from valve_friction_ros.nodes.plumbing.worker import InternalError, Readiness
 from valve_friction_ros.settings import (
@@ -275,7 +275,7 @@ class Identifier(ManagedNode):
             ("clear", self._clear, ""),
             ("reset_usage", partial(self._shown, self._reset_usage), ""),
         ):
-            create_trigger_service(self, f"~/{name}", work, failure)
+            create_service(self, f"~/{name}", work, failure)
         steady = Clock(clock_type=ClockType.STEADY_TIME)  # sim time may never start, or stop
         self.create_timer(_DIAGNOSTIC_PERIOD, self._tell, clock=steady)
         jumps = self.get_clock().create_jump_callback(
@@ -478,7 +478,7 @@ class Identifier(ManagedNode):
         """Publish the diagnostics, or a bug in them."""
         with self.guarded(_TELLING):
             self._publish_diagnostics()
-        if (bug := self.failure_of(_TELLING)) is None:
+        if (bug := self._failures.get(_TELLING)) is None:
             return
         status = self.stuck_status(bug)
         self._estimate_topic.publish(status)
