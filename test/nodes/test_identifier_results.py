@@ -40,11 +40,7 @@ from valve_friction_ros.identification import (
     identify,
     identify_bench,
 )
-from valve_friction_ros.model import (
-    BENCH_VALVE,
-    LOW_FRICTION,
-    Recording,
-)
+from valve_friction_ros.model import BENCH_VALVE, LOW_FRICTION, Recording
 
 BIAS = 1.13e-3
 

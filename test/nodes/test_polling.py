@@ -25,11 +25,7 @@ from std_srvs.srv import Trigger
 from waiting import PATIENCE
 
 from valve_friction_ros.nodes.identifier.valve_inputs import ValveInputs
-from valve_friction_ros.nodes.plumbing.polled_node import (
-    PolledNode,
-    TurnExecutor,
-    create_service,
-)
+from valve_friction_ros.nodes.plumbing.polled_node import PolledNode, TurnExecutor, create_service
 from valve_friction_ros.nodes.plumbing.polled_subscription import PolledSubscription
 from valve_friction_ros.nodes.plumbing.qos import blocks, stream
 

@@ -22,16 +22,7 @@ import numpy as np
 import pytest
 import yaml
 from faulty_identifier import FINISH, FULL, SLOW, faulty
-from live_nodes import (
-    NAMESPACE,
-    NODE,
-    SECOND,
-    STREAM,
-    SimulatedClock,
-    command,
-    stamp_of,
-    stamps_of,
-)
+from live_nodes import NAMESPACE, NODE, SECOND, STREAM, SimulatedClock, command, stamp_of, stamps_of
 from rclpy.duration import Duration
 from records import quick_record
 from rosbags.rosbag2 import Reader

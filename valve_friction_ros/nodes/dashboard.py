@@ -48,11 +48,7 @@ from valve_friction_ros.dashboard.live_state import Sources
 from valve_friction_ros.dashboard.live_strip import LiveStrip
 from valve_friction_ros.history import server_from
 from valve_friction_ros.nodes.plumbing.managed_node import ManagedNode
-from valve_friction_ros.nodes.plumbing.messages import (
-    positions_in,
-    pressures_in,
-    readable,
-)
+from valve_friction_ros.nodes.plumbing.messages import positions_in, pressures_in, readable
 from valve_friction_ros.nodes.plumbing.output_folder import folder_of
 from valve_friction_ros.nodes.plumbing.parameters import declare_parameters, values_of
 from valve_friction_ros.nodes.plumbing.polled_node import PolledNode, TurnExecutor

@@ -38,10 +38,7 @@ from valve_friction_ros.history.status_values import alarm_values
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.nodes.identifier.evidence_watch import EvidenceWatch
 from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
-from valve_friction_ros.nodes.plumbing.polled_node import (
-    PolledNode,
-    create_service,
-)
+from valve_friction_ros.nodes.plumbing.polled_node import PolledNode, create_service
 from valve_friction_ros.settings import NODES
 
 if TYPE_CHECKING:
