@@ -105,8 +105,8 @@ class ValveInputs:
         """Return the values of the diagnostic: sources and losses of the samples."""
         pressure, stem, joint = self.names
         values = {"pressure_topic": pressure, "stem_topic": stem, "stem_joint": joint}
-        inputs = {"pressures": self._pressure, "positions": self._stem, "blocks": self._blocks}
-        for name, one in inputs.items():
+        inputs = (self._pressure, self._stem, self._blocks)
+        for name, one in zip(("pressures", "positions", "blocks"), inputs, strict=True):
             if (losses := one.losses).lost:
                 values[f"{name} lost [messages]"] = str(losses.lost)
                 values[f"{name} lost [%]"] = f"{100 * losses.share:.3g}"
