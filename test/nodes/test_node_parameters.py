@@ -165,7 +165,7 @@ def test_good_changes_take_effect_and_unrelated_parameters_stay_settable(client)
     width = (100.0 + (100.0 if math.isnan(static) else static)) / results["spring_constant"]
     assert results["dead_band"] == pytest.approx(width / 0.05, rel=1e-12)
     assert "coulomb_friction" in client.last_values()["fixed"].split(", ")
-    back = {"fixed.coulomb_friction": math.nan, "derivative_window": 31, "travel": 0.028575}
+    back = {"fixed.coulomb_friction": math.nan, "derivative_window": 0, "travel": 0.028575}
     assert client.set_together(NODE, back).successful
 
 
