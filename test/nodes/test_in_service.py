@@ -380,16 +380,3 @@ def test_the_figures_outlive_a_kill(live, history):
     client.status_values(lambda one: values_of(one)["moves"] == "0", "a new packing")
     assert client.next_status().level == OK
     assert read_answers(history, NODE) == ()
-
-
-def test_without_a_command_nothing_is_said(live):
-    live.start_identifier({"dead_time_limit": 0.1, "window": 3600.0})
-    stamps, pressure, position = answer(0.5, 0.5)
-    live.client.send((stamps, pressure), (stamps, position))
-    live.client.wait_for_buffered(2 * stamps.size)
-    status = live.client.next_status()
-    shown = [
-        key for key in values_of(status) if not key.startswith(("evidence ", "baseline_lacks "))
-    ]
-    assert not [key for key in shown if "command" in key or "moves" in key]
-    assert "command" not in status.message

@@ -128,21 +128,6 @@ def test_every_parameter_is_described_with_its_unit_and_its_range(live, name):
             assert limits[0] < limits[1]
 
 
-def test_known_values_have_the_units_of_their_parameters(client):
-    units = {
-        "mass": "kg",
-        "viscous_friction": "N·s/m",
-        "coulomb_friction": "N",
-        "static_friction": "N",
-        "spring_constant": "N/m",
-        "spring_preload": "N",
-        "limit_velocity": "m/s",
-    }
-    descriptors = client.describe(NODE, [f"fixed.{name}" for name in units])
-    for (name, unit), descriptor in zip(units.items(), descriptors, strict=True):
-        assert descriptor.description.startswith(f"Known value of {name} [{unit}];")
-
-
 @pytest.mark.parametrize(
     ("changes", "words"), BAD_CHANGES, ids=["-".join(map(str, c.items())) for c, _ in BAD_CHANGES]
 )

@@ -19,24 +19,19 @@ import time
 from pathlib import Path
 
 import pytest
-from records import quick_record
 from waiting import PATIENCE, wait_until
 
 from valve_friction_ros.health import (
-    FrictionMonitor,
-    MonitorSettings,
     RefusedRecordError,
-    identify_snapshot,
 )
 from valve_friction_ros.health.measured import Measured
 from valve_friction_ros.identification import RefusalError
-from valve_friction_ros.model import BENCH_VALVE, compiled
+from valve_friction_ros.model import compiled
 from valve_friction_ros.nodes.identifier import workers as workers_module
 from valve_friction_ros.nodes.identifier.workers import running_workers
 from valve_friction_ros.nodes.plumbing import processes as module
 from valve_friction_ros.nodes.plumbing.processes import ElsewhereError, Processes
 from valve_friction_ros.nodes.plumbing.worker import Worker, workers_have_ended
-from valve_friction_ros.streams import rows_arrived
 
 NUMBERS = {"position_noise": Measured(1e-6, 1e-7)}
 
@@ -136,15 +131,6 @@ def is_running(process):
     except FileNotFoundError:
         return False
     return state != "Z"
-
-
-def test_a_result_is_that_of_a_thread(processes):
-    record = quick_record()
-    monitor = FrictionMonitor(MonitorSettings(BENCH_VALVE))
-    columns = zip(record.time, record.pressure, record.position, strict=True)
-    monitor.buffer.add_arrivals(rows_arrived([*columns]))
-    result = processes.done(identify_snapshot, *monitor.input())
-    assert result.to_dict() == identify_snapshot(*monitor.input()).to_dict()
 
 
 def test_what_work_raises_comes_whole(processes):
