@@ -91,7 +91,7 @@ def _watch() -> None:
     """Run the dashboard's node without pages, and print until a stop signal."""
     import rclpy  # noqa: PLC0415 - the hosts with valves shall not load a dashboard
 
-    from valve_friction_ros.nodes.dashboard.node import Dashboard  # noqa: PLC0415
+    from valve_friction_ros.nodes.dashboard import Dashboard  # noqa: PLC0415
     from valve_friction_ros.nodes.plumbing.polled_node import TurnExecutor  # noqa: PLC0415
     from valve_friction_ros.nodes.plumbing.running import StopRequest  # noqa: PLC0415
 

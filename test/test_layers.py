@@ -58,7 +58,6 @@ INNER = {
     "records.bags": set(),
     "dashboard.pages": set(),
     "nodes.plumbing": set(),
-    "nodes.dashboard": {"plumbing"},
     "nodes.identifier": {"plumbing"},
     "commands.arguments": set(),
     "commands.demo": set(),

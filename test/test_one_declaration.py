@@ -279,7 +279,7 @@ def test_its_rows_and_diagnostics(recording, tmp_path):
     assert (entry.method, entry.friction) == ("width", friction)
     assert entry.to_dict()["parameters"] == result.to_dict()["parameters"]
 
-    status = estimate_status(monitor, "fv_1", "FV-1", ())
+    status = estimate_status(monitor, "fv_1", "FV-1", (), None, {})
     values = {each.key: each.value for each in status.values}
     assert values["method"] == "width"
     assert float(values["coulomb_friction [N]"]) == pytest.approx(friction.value, rel=1e-8)

@@ -39,7 +39,7 @@ _WRITERS = {
     "identifier/usage_watch.py": ("values",),
     "identifier/response_watch.py": ("values", "_deviation_values", "_move_values"),
     "identifier/alarm_board.py": ("values",),
-    "identifier/alarm_recorder.py": ("values",),
+    "identifier/recordings.py": ("values",),
     "identifier/alerts.py": ("_mark",),
     "identifier/history_writer.py": ("values",),
     "identifier/valve_inputs.py": ("values",),

@@ -53,10 +53,9 @@ def _running(node: str) -> Iterator[object]:
 
     from valve_friction_ros.alerts import AlertSender
     from valve_friction_ros.health import DigestDesk
-    from valve_friction_ros.nodes.dashboard.node import Dashboard
+    from valve_friction_ros.nodes.dashboard import Dashboard
     from valve_friction_ros.nodes.identifier.node import Identifier
     from valve_friction_ros.nodes.identifier.workers import HistoryThread, Workers
-    from valve_friction_ros.nodes.plumbing.processes import ThisProcess
     from valve_friction_ros.nodes.plumbing.worker import Worker
     from valve_friction_ros.nodes.pressure_source import PressureSource
     from valve_friction_ros.nodes.simulator import Simulator
@@ -64,7 +63,7 @@ def _running(node: str) -> Iterator[object]:
 
     some = (Worker(name) for name in ("identify", "files", "evidence"))
     workers = Workers(
-        ThisProcess(),
+        lambda work, *arguments: work(*arguments),
         next(some),
         next(some),
         HistoryThread(),

@@ -81,6 +81,11 @@ class Live:
         self.client.connect()
         return process
 
+    def client_of_identifier(self, parameters=None, script=None):
+        """Start an identifier; return the client beside it."""
+        self.start_identifier(parameters, script=script)
+        return self.client
+
     def kill(self, process):
         """End a node by kill -9; what comes now is of the next one."""
         self.client.watched.clear()

@@ -32,8 +32,6 @@ BLOCK = "block"
 """The loop stands still as long as it is there."""
 FULL, SLOW = "full", "slow"
 """Folder in which no file may grow; and one in which a bag takes until `FINISH` lies beside it."""
-BUSY = 300.0
-"""Time, s, for which the worker of `raising` is busy."""
 
 
 def faulty(fault):
@@ -111,13 +109,14 @@ def disk_trouble():
     return node
 
 
-def break_identifiers(place):
-    """Put bugs into the identifier of a namespace."""
+def one_raising():
+    """Of several valves fv_102 has bugs."""
+    from valve_friction_ros.nodes import identifiers
     from valve_friction_ros.nodes.identifier.node import Identifier
 
     def raising(name, method):
         def call(self, *arguments):
-            is_it = self.get_namespace() == place and Path(RAISE).exists()
+            is_it = self.get_namespace() == "/fv_102" and Path(RAISE).exists()
             if is_it and Path(RAISE).read_text() == name:
                 raise ZeroDivisionError("a bug")
             return method(self, *arguments)
@@ -127,21 +126,6 @@ def break_identifiers(place):
     Identifier.configure = raising(BEGINNING, Identifier.configure)
     Identifier.poll = raising(LOOP, Identifier.poll)
     Identifier._publish_diagnostics = raising(TIMER, Identifier._publish_diagnostics)
-
-
-def raising():
-    """A bug, while the worker is busy."""
-    break_identifiers("/fv_101")
-    node, workers = identifier()
-    workers.compile_methods = lambda: time.sleep(BUSY)
-    return node
-
-
-def one_raising():
-    """Of several valves fv_102 has the bug."""
-    from valve_friction_ros.nodes import identifiers
-
-    break_identifiers("/fv_102")
     return identifiers
 
 

@@ -9,9 +9,7 @@
 
 """Recordings of alarms over DDS: a bag and a page, bounded, named, also after a restart."""
 
-import json
 import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -20,23 +18,20 @@ import pytest
 from faulty_identifier import faulty
 from histories import START as DAWN
 from histories import VALVE, success
-from live_nodes import NAMESPACE, PROJECT, SECOND, START, values_of
+from live_nodes import ERROR, NODE, SECOND, START, values_of
 from records import quick_record
 from rosbags.rosbag2 import Reader
 
 from valve_friction_ros.health import Baseline, Level
 from valve_friction_ros.history import (
     AlarmRecording,
-    HistoryFile,
     KeptBaseline,
     alarm_recordings,
     keep_alarm_recording,
 )
 from valve_friction_ros.model import BENCH_VALVE, HIGH_FRICTION
-from valve_friction_ros.nodes.identifier.alarm_recorder import _LATE
+from valve_friction_ros.nodes.identifier.recordings import _LATE
 
-NODE = f"{NAMESPACE}/identifier"
-ERROR = b"\x02"
 TICK = 1.0
 """Period of the diagnostics, s."""
 HEALTHY, TIGHT = quick_record(), quick_record(HIGH_FRICTION)
@@ -46,8 +41,7 @@ FAST = {"method": "bench", "alarm_recording": 0.1, "alarm_pause": 0.0}
 def baseline_set(live, parameters, script=None):
     """Start a node with the healthy valve as its baseline."""
     node = live.start_identifier({**FAST, **parameters}, script=script)
-    live.client.identified(HEALTHY)
-    assert live.client.trigger("set_baseline").success
+    live.client.set_baseline(HEALTHY)
     return node
 
 
@@ -102,12 +96,12 @@ def samples_in(bag):
         return reader.message_count
 
 
-def test_an_alarm_is_recorded_and_the_whole_takes_the_place_of_its_first_part(live, tmp_path):
+def test_an_alarm_is_recorded_and_the_whole_takes_the_place_of_its_first_part(live, history):
     baseline_set(live, {"alarm_recording": 10.0, "alarm_recordings": 1})
     client = live.client
-    message = client.identified(TIGHT)
+    client.identified(TIGHT)
     assert client.statuses[-1][1].level == ERROR
-    folder = tmp_path / "valve_friction_ros" / "alarms"
+    folder = history.path.with_name("alarms")
     client.wait_until(lambda: [*folder.glob("alarm_*")], "the first part")
     assert "alarm_recording" not in client.last_values()  # what comes after is awaited
     client.send_record(TIGHT, START + 5 * SECOND)
@@ -121,38 +115,16 @@ def test_an_alarm_is_recorded_and_the_whole_takes_the_place_of_its_first_part(li
     assert values["alarm_recording level"] == "ERROR"
     assert values["alarm_recording [time]"][:10].count("-") == 2
     assert "Excess friction" in paged(client, path)
-
-    # The whole bag has both records; the first alone gives what the node has said.
-    baseline = float(values["baseline_coulomb_friction [N]"])
-    command = [sys.executable, "-m", "valve_friction_ros", "identify", str(path), "--json"]
-    done = subprocess.run(
-        [*command, "--end", "4.995", "--baseline-coulomb-friction", f"{baseline}"],
-        cwd=PROJECT,
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    told = json.loads(done.stdout)
-    assert told["parameters"]["coulomb_friction"]["value"] == pytest.approx(
-        float(values["coulomb_friction [N]"]), rel=1e-6
-    )
-    assert told["diagnosis"]["level"] == "ERROR"
-    assert told["diagnosis"]["message"].partition(":")[0] == message.partition(":")[0]
-
-    history = HistoryFile(tmp_path / "valve_friction_ros" / "history.sqlite")
     (kept,) = client.wait_until(lambda: alarm_recordings(history, NODE), "a row of the alarm")
     assert kept.path == path
     assert kept.message.startswith("excess friction")
 
 
-def test_what_was_before_an_alarm_outlives_a_kill(live, tmp_path):
+def test_what_was_before_an_alarm_outlives_a_kill(live, history):
     """Killed before the time after the rise is over; what a kill left is neither half nor lost."""
     node = baseline_set(live, {"alarm_recording": 600.0})
-    client, folder = live.client, tmp_path / "valve_friction_ros" / "alarms"
+    client, folder = live.client, history.path.with_name("alarms")
     client.identified(TIGHT)
-    history = HistoryFile(tmp_path / "valve_friction_ros" / "history.sqlite")
     (kept,) = client.wait_until(lambda: alarm_recordings(history, NODE), "a row of the alarm")
     live.kill(node)
     assert names(folder) == [kept.path.name]
@@ -176,7 +148,9 @@ def small_disk(tmp_path):
 
 
 @pytest.mark.parametrize("reason", ["No space left on device", "Not a directory"])
-def test_what_cannot_be_written_is_told_and_no_torn_bag_stays(live, tmp_path, reason, request):
+def test_what_cannot_be_written_is_told_and_no_torn_bag_stays(
+    live, history, tmp_path, reason, request
+):
     if reason.startswith("No space"):
         folder = request.getfixturevalue("small_disk")
     else:
@@ -193,16 +167,14 @@ def test_what_cannot_be_written_is_told_and_no_torn_bag_stays(live, tmp_path, re
     wait_beyond_a_recording(client)
     assert not folder.exists() or names(folder) == []
     assert "alarm_recording" not in client.last_values()
-    history = HistoryFile(tmp_path / "valve_friction_ros" / "history.sqlite")
     assert alarm_recordings(history, NODE) == ()
     restarted(live, node, {"alarm_folder": str(tmp_path / "room")})
     assert alarmed(client).parent == tmp_path / "room"
     assert problem not in client.last_values()
 
 
-def test_it_is_named_after_a_restart(live, tmp_path):
+def test_it_is_named_after_a_restart(live, history, tmp_path):
     """The level that a node begins with is none that has risen."""
-    history = HistoryFile(tmp_path / "valve_friction_ros" / "history.sqlite")
     history.add(success(friction=400.0))
     history.set_baseline(VALVE, KeptBaseline(Baseline(100.0, 1.0), DAWN, DAWN))
     one = AlarmRecording(DAWN, Level.ERROR, tmp_path / "alarms" / "one", "excess friction")
@@ -213,11 +185,10 @@ def test_it_is_named_after_a_restart(live, tmp_path):
     values = values_of(status)
     assert values["alarm_recording"] == str(one.path)
     assert values["alarm_recording [time]"] == "2026-09-21T14:13:20Z"
-    live.client.send_record(TIGHT)
-    live.client.wait_for_buffered(2 * len(TIGHT))
+    live.client.fill(TIGHT)
     live.client.next_status()
     assert alarm_recordings(history, NODE) == (one,)
-    assert not (tmp_path / "valve_friction_ros" / "alarms").exists()
+    assert not history.path.with_name("alarms").exists()
 
 
 def test_many_alarms_are_bounded_and_nothing_else_is_removed(live, tmp_path):
@@ -250,11 +221,11 @@ def test_many_alarms_are_bounded_and_nothing_else_is_removed(live, tmp_path):
     restarted(live, node, {**chosen, "alarm_megabytes": 0.001})
     client.identified(HEALTHY)
     client.identified(TIGHT)
-    told = client.status_values(lambda one: "alarm_recording problem" in values_of(one), "no room")[
-        "alarm_recording problem"
-    ]
-    assert "MB has no room in alarm_megabytes (0.001): raise it" in told
-    assert names(folder) == sorted(others)
+    problem = "MB has no room in alarm_megabytes (0.001): raise it"
+    client.next_status(
+        lambda one: problem in values_of(one).get("alarm_recording problem", ""), "no room"
+    )
+    client.wait_until(lambda: names(folder) == sorted(others), "no recording")
 
 
 def test_a_level_that_flaps_is_recorded_once(live):
@@ -281,9 +252,8 @@ def test_what_is_not_recorded(live, tmp_path):
     wait_beyond_a_recording(client)
     assert "alarm_recording" not in client.last_values()
     restarted(live, node, {"alarm_recording": 0.0})
-    client.identified(HEALTHY)
     assert client.set_together(NODE, {"baseline_in_alarm": True}).successful
-    assert client.trigger("set_baseline").success
+    client.set_baseline(HEALTHY)
     client.identified(TIGHT)
     assert client.statuses[-1][1].level == ERROR
     wait_beyond_a_recording(client)

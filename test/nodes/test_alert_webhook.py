@@ -12,7 +12,7 @@
 import time
 
 import pytest
-from live_nodes import NAMESPACE, values_of
+from live_nodes import ERROR, NODE, OK, WARN, values_of
 from records import quick_record
 from webhook_server import Receiver, answer_never, answer_with, self_signed
 
@@ -23,8 +23,6 @@ from valve_friction_ros.identification import identify
 from valve_friction_ros.model import BENCH_VALVE, HIGH_FRICTION
 from valve_friction_ros.usage import BINS, Usage, UsedDay
 
-NODE = f"{NAMESPACE}/identifier"
-OK, WARN, ERROR = b"\x00", b"\x01", b"\x02"
 HEALTHY, TIGHT = quick_record(), quick_record(HIGH_FRICTION)
 KNOWN = {"baseline_coulomb_friction": Baseline.of(identify(HEALTHY, BENCH_VALVE)).coulomb_friction}
 SECRETS = {"VALVE_FRICTION_WEBHOOK_SECRET": "k3y", "VALVE_FRICTION_WEBHOOK_TOKEN": "t0ken"}
@@ -34,6 +32,10 @@ SECRETS = {"VALVE_FRICTION_WEBHOOK_SECRET": "k3y", "VALVE_FRICTION_WEBHOOK_TOKEN
 def secrets(monkeypatch):
     for name, value in SECRETS.items():
         monkeypatch.setenv(name, value)
+
+
+def posting_to(receiver):
+    return {**KNOWN, "webhook_url": receiver.url, "webhook_period": 0.0}
 
 
 def changes(receiver):
@@ -80,7 +82,7 @@ def test_each_change_of_level_is_posted_once(live, tmp_path, monkeypatch):
 
 def test_a_refused_alert_is_upkeep_and_no_alert(live):
     with Receiver(answer=answer_with(404)) as receiver:
-        node = live.start_identifier({**KNOWN, "webhook_url": receiver.url, "webhook_period": 0.0})
+        node = live.start_identifier(posting_to(receiver))
         client = live.client
         client.identified(TIGHT)
         client.wait_until(lambda: len(receiver.requests) == 1, "an alert")
@@ -118,8 +120,9 @@ def test_a_receiver_that_hangs_holds_up_neither_diagnostics_nor_the_end(live):
 
 def test_a_flapping_valve_posts_one_change_a_period(live):
     with Receiver() as receiver:
-        live.start_identifier({**KNOWN, "webhook_url": receiver.url, "webhook_period": 3600.0})
-        client = live.client
+        client = live.client_of_identifier(
+            {**KNOWN, "webhook_url": receiver.url, "webhook_period": 3600.0}
+        )
         for record, level in ((TIGHT, ERROR), (HEALTHY, OK)) * 2:
             client.identified(record)
             client.next_status(lambda one, level=level: one.level == level, "the level")
@@ -129,41 +132,14 @@ def test_a_flapping_valve_posts_one_change_a_period(live):
         assert changes(receiver)[1] == ("ERROR", "OK")
 
 
-def test_silence_of_the_inputs_is_posted_and_a_restart_is_not(live):
+def test_silence_of_the_inputs_is_posted(live):
     with Receiver() as receiver:
-        chosen = {**KNOWN, "webhook_url": receiver.url, "webhook_period": 0.0}
-        node = live.start_identifier(chosen)
-        client = live.client
-        client.identified(TIGHT)
-        client.wait_until(lambda: len(receiver.requests) == 1, "an alert")
-        client.watched.clear()
-        node.stop()
-        live.nodes.remove(node)
-        client.statuses.clear()
-        live.start_identifier(chosen)
-        assert client.next_status().level == ERROR
-        client.identified(HEALTHY)
-        client.wait_until(lambda: len(receiver.requests) == 2, "another alert")
-        assert client.set_together(NODE, {"input_timeout": 0.5}).successful
-        client.wait_until(lambda: len(receiver.requests) == 3, "silence")
-        assert changes(receiver) == [("OK", "ERROR"), ("ERROR", "OK"), ("OK", "WARN")]
-        assert "no data on" in receiver.bodies[-1]["message"]
-
-
-def test_nobody_on_the_graph_turns_the_alerts_to_another_address(live, monkeypatch):
-    with Receiver() as receiver, Receiver() as thief:
-        monkeypatch.setenv("VALVE_FRICTION_WEBHOOK_URL", receiver.url)
-        node = live.start_identifier({**KNOWN, "webhook_period": 0.0})
-        refused = live.client.set_together(NODE, {"webhook_url": thief.url})
-        assert not refused.successful
-        assert "read-only" in refused.reason
-        live.client.identified(TIGHT)
-        live.client.wait_until(lambda: receiver.requests, "an alert")
-        assert receiver.requests[0][1]["Authorization"] == "Bearer t0ken"
-        assert thief.requests == []
-        assert live.client.last_values()["webhook"] == f"http://127.0.0.1:{receiver.port}"
-    shown = node.errors + node.output + "".join(map(str, live.client.statuses))
-    assert receiver.url.rpartition("/")[2] not in shown
+        live.start_identifier(posting_to(receiver))
+        live.client.identified(HEALTHY)
+        assert live.client.set_together(NODE, {"input_timeout": 0.5}).successful
+        live.client.wait_until(lambda: receiver.requests, "silence")
+        assert changes(receiver) == [("OK", "WARN")]
+        assert "no data on" in receiver.bodies[0]["message"]
 
 
 def test_the_token_goes_only_to_the_address_beside_it(live, monkeypatch):
@@ -190,7 +166,7 @@ def test_what_is_found_on_a_valve_is_told_once_whatever_restarts(live, history):
     history.path.parent.mkdir(parents=True, exist_ok=True)
     keep_usage(history, KeptValve(NODE, "FV-101"), "run", [used])
     with Receiver() as receiver:
-        chosen = {**KNOWN, "webhook_url": receiver.url, "webhook_period": 0.0}
+        chosen = posting_to(receiver)
         client = live.client
         for _ in range(2):
             node = live.start_identifier({**chosen, "reversal_limit": 20.0})
@@ -201,9 +177,8 @@ def test_what_is_found_on_a_valve_is_told_once_whatever_restarts(live, history):
         live.start_identifier({**chosen, "reversal_limit": 20.0})
         assert client.next_status().level == WARN  # and the client has met the new node
         client.next_status()
-        client.identified(HEALTHY)
         assert client.set_together(NODE, {"baseline_in_alarm": True}).successful
-        assert client.trigger("set_baseline").success
+        client.set_baseline(HEALTHY)
         assert receiver.requests == []
         assert history.baseline(NODE).level == Level.WARN
         for limit, count in ((0.0, 1), (20.0, 2)):
@@ -241,8 +216,7 @@ def test_what_waited_at_a_kill_is_told_after_the_restart(live, history):
 
 def test_one_digest_a_day_lists_the_alarms(live):
     with Receiver() as receiver:
-        live.start_identifier({**KNOWN, "webhook_url": receiver.url, "webhook_period": 0.0})
-        client = live.client
+        client = live.client_of_identifier(posting_to(receiver))
         client.identified(TIGHT)
         client.wait_until(lambda: len(receiver.requests) == 1, "an alert")
         soon = (time.time() + 5.0) % 86_400 / 3600

@@ -7,15 +7,19 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The simulated valve and the source of its pressure over topics: the numbers of the model."""
+"""A bench over topics: the simulated valve, the source of its pressure, and stroke tests played."""
 
+import json
 import math
 
 import numpy as np
 import pytest
-from live_nodes import NAMESPACE, SECOND, START, STREAM, stamp_of
+from live_nodes import LATCHED, NAMESPACE, SECOND, START, STREAM, stamp_of
 from sensor_msgs.msg import FluidPressure, JointState
+from std_msgs.msg import String
 
+from valve_friction_ros.commands.plan_test import player, write_test
+from valve_friction_ros.identification import IdentificationSettings
 from valve_friction_ros.model import (
     BENCH_VALVE,
     GRAPHITE_PACKING,
@@ -28,6 +32,7 @@ from valve_friction_ros.model import (
     converter_response,
     simulate,
 )
+from valve_friction_ros.planning import Conditions, Limits, known_friction, plan_test
 
 NODE = f"{NAMESPACE}/simulator"
 PERIOD = 0.01
@@ -114,13 +119,6 @@ def test_coulomb_above_static_friction_is_refused(stem):
     np.testing.assert_allclose(position, expected.position, **EXACT)
 
 
-@pytest.mark.parametrize("name", [*KARNOPP, "limit_velocity", "position_noise", "diaphragm_area"])
-def test_negative_parameters_are_refused(stem, name):
-    (result,) = stem.client.set_parameters(NODE, {name: -1.0})
-    assert not result.successful
-    assert name in result.reason
-
-
 def test_stamps_that_go_back_start_the_stem_anew(stem, running):
     _, _, process, _ = running
     stem.respond(PRESSURE[:500])
@@ -203,10 +201,12 @@ def heard(live, parameters, count):
     return stamps, np.array([message.fluid_pressure for message in messages[:count]])
 
 
-def place_in(signal, heard_part):
-    """Number of the sample at which the listener joined: the best match in `signal`."""
+def require_part(heard_part, signal):
+    """Require that what was heard is a part of `signal`, from where the listener joined."""
     windows = np.lib.stride_tricks.sliding_window_view(signal, heard_part.size)
-    return int(np.argmin(np.abs(windows - heard_part).max(axis=1)))
+    first = int(np.argmin(np.abs(windows - heard_part).max(axis=1)))
+    np.testing.assert_allclose(heard_part, windows[first], rtol=1e-12)
+    assert np.ptp(heard_part) > 1e3
 
 
 def published(excitation, lag=LAG, seconds=200.0):
@@ -214,24 +214,14 @@ def published(excitation, lag=LAG, seconds=200.0):
     return converter_response(excitation.sample(time), 1 / RATE, lag)
 
 
-def test_square_wave_behind_the_converter_without_a_lost_sample(live):
-    stamps, pressure = heard(live, PARAMETERS, 2 * ONE_PERIOD)
-    np.testing.assert_array_equal(np.diff(stamps), round(SECOND / RATE))
-    expected = published(WAVE)
-    first = place_in(expected, pressure)
-    np.testing.assert_allclose(pressure, expected[first : first + pressure.size], rtol=1e-12)
-    assert np.ptp(pressure) > 0.9 * (WAVE.high - WAVE.low)
-
-
-def test_noise_is_white_and_told_by_its_seed(live):
+def test_a_square_wave_behind_the_converter_with_noise_told_by_its_seed(live):
+    """Without a lost sample."""
     deviation = 100.0
     noisy = {**PARAMETERS, "pressure_noise": deviation, "noise_seed": 5}
     stamps, pressure = heard(live, noisy, 2 * ONE_PERIOD)
     np.testing.assert_array_equal(np.diff(stamps), round(SECOND / RATE))
     clean = published(WAVE)
-    expected = clean + deviation * np.random.default_rng(5).standard_normal(clean.size)
-    first = place_in(expected, pressure)
-    np.testing.assert_allclose(pressure, expected[first : first + pressure.size], rtol=1e-12)
+    require_part(pressure, clean + deviation * np.random.default_rng(5).standard_normal(clean.size))
 
 
 def test_a_rate_that_nanoseconds_do_not_divide(live):
@@ -242,38 +232,19 @@ def test_a_rate_that_nanoseconds_do_not_divide(live):
     assert np.abs(since_first - exact).max() <= 1.0  # each of the two ends is rounded
 
 
-def test_signal_from_a_file(live, tmp_path):
+def test_signals_that_are_no_wave(live, tmp_path):
+    """A file, whose rows are joined by lines; and steps, of which none falls on a sample."""
     file = tmp_path / "steps.csv"
     file.write_text("time_s,note,pressure_pa\n10,a,60000\n11,b,80000\n11.5,c,70000\n20,d,90000\n")
-    parameters = {
-        "excitation": "file",
-        "file": str(file),
-        "sample_rate": RATE,
-        "speed": 1.0,
-        "converter_lag": 0.0,
-    }
-    _, pressure = heard(live, parameters, 300)
+    exact = {**PARAMETERS, "converter_lag": 0.0, "speed": 1.0}
+    _, pressure = heard(live, {**exact, "excitation": "file", "file": str(file)}, 300)
     time = np.arange(4000) / RATE
-    expected = np.interp(time, [0, 1, 1.5, 10], [6e4, 8e4, 7e4, 9e4])
-    first = place_in(expected, pressure)
-    np.testing.assert_allclose(pressure, expected[first : first + 300], rtol=1e-12)
-    assert np.ptp(pressure) > 1e3
-
-
-def test_isa_steps(live):
-    hold = 0.0513  # s; no step falls on a sample, where rounding would decide
-    parameters = {
-        **PARAMETERS,
-        "excitation": "isa_steps",
-        "period": hold,
-        "converter_lag": 0.0,
-        "speed": 0.5,
-    }
-    _, pressure = heard(live, parameters, 200)
+    require_part(pressure, np.interp(time, [0, 1, 1.5, 10], [6e4, 8e4, 7e4, 9e4]))
+    live.kill(live.nodes[-1])
+    hold = 0.0513  # s
+    _, pressure = heard(live, {**exact, "excitation": "isa_steps", "period": hold}, 200)
     steps = IsaSteps(centre=1.05e5, span=9e4, hold=hold)
-    expected = published(steps, lag=0.0, seconds=10.0)
-    first = place_in(expected, pressure)
-    np.testing.assert_allclose(pressure, expected[first : first + 200], rtol=1e-12)
+    require_part(pressure, published(steps, lag=0.0, seconds=10.0))
     assert np.unique(pressure).size > 5
 
 
@@ -281,11 +252,137 @@ def test_jitter_is_of_the_time_alone_and_bounded(live):
     """Stamps leave the grid by up to the jitter either way; the pressures are as before."""
     jitter = 1e-3
     stamps, pressure = heard(live, {**PARAMETERS, "time_jitter": jitter}, 2 * ONE_PERIOD)
-    expected = published(WAVE)
-    first = place_in(expected, pressure)
-    np.testing.assert_allclose(pressure, expected[first : first + pressure.size], rtol=1e-12)
+    require_part(pressure, published(WAVE))
     off = (stamps - stamps[0]) / SECOND - np.arange(stamps.size) / RATE
     off -= (off.max() + off.min()) / 2
     assert np.abs(off).max() <= 1.001 * jitter
     assert off.std() == pytest.approx(jitter / np.sqrt(3), rel=0.1)
     assert np.all(np.diff(stamps) > 0)
+
+
+HOME = 1e5
+ROWS = ((0.0, HOME), (0.5, HOME), (2.5, 1.4e5), (600.0, 1.4e5))
+PLAYER = f"{NAMESPACE}/stroke_player"
+
+
+@pytest.fixture
+def stroke_player(live, tmp_path):
+    """A player; `send_signals` keeps its send_signals coming, at the position `live.position`."""
+    file = tmp_path / "test.csv"
+    file.write_text("time_s,pressure_pa\n" + "".join(f"{t},{p}\n" for t, p in ROWS))
+    live.set_points = live.client.listen(FluidPressure, f"{NAMESPACE}/pressure_set_point", STREAM)
+    live.states = live.client.listen(String, f"{PLAYER}/state", LATCHED)
+    parameters = {"file": str(file), "file_minimum": 0.9e5, "file_maximum": 1.5e5, "silence": 5.0,
+                  "position_minimum": 0.002, "position_maximum": 0.02}  # fmt: skip
+    live.player = live.start("stroke_player", parameters)
+    live.position, live.sent = 0.01, 0
+    live.client.connect()
+    return live
+
+
+def send_signals(live):
+    """Send a sample of each signal."""
+    live.sent += 1
+    live.client.send_pressure(START + live.sent * SECOND // 100, 1.1e5)
+    live.client.send_stem(START + live.sent * SECOND // 100, live.position)
+
+
+def wait(live, condition, what):
+    """Wait while the send_signals come."""
+
+    def met():
+        send_signals(live)
+        return condition()
+
+    live.client.wait_until(met, what)
+
+
+def last(live):
+    return live.set_points[-1].fluid_pressure if live.set_points else None
+
+
+def test_it_plays_when_asked_and_goes_back_by_limit_and_by_its_end(stroke_player):
+    live = stroke_player
+    assert not live.client.trigger("start", PLAYER).success  # no signal has come
+    wait(live, lambda: live.sent > 50, "send_signals")
+    assert last(live) is None  # and nothing begins by itself
+    answer = live.client.trigger("start", PLAYER)
+    assert answer.success, answer.message
+    wait(live, lambda: last(live) == 1.4e5, "the highest set point")
+    values = [one.fluid_pressure for one in live.set_points]
+    assert values[0] == HOME
+    assert values == sorted(values)
+    live.position = 0.0201
+    wait(live, lambda: last(live) == HOME, "the way back")
+    wait(live, lambda: "beyond its limit of 0.02 m" in live.states[-1].data, "the state")
+    live.position = 0.01
+    wait(live, lambda: live.sent % 50 == 0, "good send_signals")
+    assert live.client.trigger("start", PLAYER).success
+    wait(live, lambda: last(live) > 1.2e5, "set points")
+    live.player.interrupt()
+    live.player.require_good_end()
+    live.client.drain()
+    assert last(live) == HOME
+
+
+TEST_RATE, TEST_SPEED = 50.0, 4.0
+NAMES = ("coulomb_friction", "sliding_friction")
+
+
+@pytest.fixture(scope="module")
+def plan():
+    """Planned for a friction that is two thirds of the true one."""
+    true = HIGH_FRICTION
+    frictions = known_friction(
+        true.coulomb_friction / 1.5,
+        (true.spring_constant, true.spring_preload),
+        true.mass,
+        viscous_friction=true.viscous_friction / 1.5,
+        factor=1.5,
+    )
+    settings = IdentificationSettings(assumed_mass=1.6)
+    return plan_test(BENCH_VALVE, frictions, Limits(duration=30.0), Conditions(TEST_RATE), settings)
+
+
+def test_what_is_reported_is_what_was_promised(live, plan, tmp_path):
+    file = tmp_path / "stroke_test.csv"
+    write_test(file, plan)
+    valve = {
+        "diaphragm_area": BENCH_VALVE.diaphragm_area,
+        "pressure_reference": BENCH_VALVE.pressure_reference,
+        "travel": BENCH_VALVE.travel,
+    }
+    names = (
+        "mass",
+        "viscous_friction",
+        "coulomb_friction",
+        "static_friction",
+        "spring_constant",
+        "spring_preload",
+    )
+    true = {name: getattr(HIGH_FRICTION, name) for name in names}
+    live.start("simulator", {**valve, **true, "position_noise": 10e-6})
+    live.start_identifier({**valve, "window": 40.0, "assumed_mass": 1.6})
+    live.client.wait_until(
+        lambda: live.client.node.count_publishers(f"{NAMESPACE}/stem_state"), "the stem"
+    )
+    heard = live.client.listen(JointState, f"{NAMESPACE}/stem_state", STREAM)
+    played = {"sample_rate": TEST_RATE, "speed": TEST_SPEED, "pressure_noise": 100.0}
+    live.start("pressure_source", player(plan, file) | played)
+
+    def has_ended():
+        stamps = [stamp_of(message.header.stamp) for message in heard[:1] + heard[-1:]]
+        return stamps and stamps[1] - stamps[0] >= (plan.test.duration - 1.0) * SECOND
+
+    live.client.wait_until(has_ended, "the end of the test")
+    positions = [message.position[0] / BENCH_VALVE.travel for message in heard]
+    assert 0.19 < min(positions) < 0.45
+    assert 0.55 < max(positions) < 0.81
+    response = live.client.trigger("identify")
+    assert response.success, response.message
+    promised = plan.forecasts[-1]
+    assert promised.parameters.coulomb_friction == pytest.approx(606.0)
+    values, widths = live.client.friction(*NAMES), live.client.half_widths(*NAMES)
+    assert abs(values["coulomb_friction"] - 606.0) <= widths["coulomb_friction"]
+    for name in NAMES:
+        assert 0.4 < widths[name] / promised.half_widths[name] < 2.5, json.dumps(widths)

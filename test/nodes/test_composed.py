@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Nodes in a user's own process: in each executor of rclpy, and managed by their life cycle."""
+"""Nodes in a user's own process: in each executor of rclpy, by their life cycle, and documented."""
 
 import contextlib
 import importlib.metadata
@@ -17,9 +17,10 @@ import urllib.request
 
 import pytest
 import rclpy
+from extension.node_graph import graph_as_markdown, graph_of
 from lifecycle_msgs.msg import State, Transition
 from lifecycle_msgs.srv import ChangeState, GetState
-from live_nodes import NAMESPACE, values_of
+from live_nodes import NAMESPACE, NODE, PROJECT, values_of
 from local_server import free_port
 from rcl_interfaces.srv import GetParameters
 from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
@@ -33,7 +34,6 @@ from valve_friction_ros.nodes.identifier.node import Identifier
 from valve_friction_ros.nodes.plumbing import polled_node, polled_subscription, rclpy_private
 from valve_friction_ros.nodes.plumbing.polled_node import TurnExecutor
 
-IDENTIFIER = f"{NAMESPACE}/identifier"
 EXECUTORS = {
     "single": SingleThreadedExecutor,
     "multi": MultiThreadedExecutor,
@@ -102,13 +102,13 @@ def converse(client):
     """Ask a composed identifier for all that a user may ask for."""
     client.connect()
     parameters = client.call(
-        GetParameters, f"{IDENTIFIER}/get_parameters", GetParameters.Request(names=["window"])
+        GetParameters, f"{NODE}/get_parameters", GetParameters.Request(names=["window"])
     )
     assert parameters.values[0].double_value == 60.0
-    client.set_parameters(IDENTIFIER, {"window": 50.0})
+    client.set_parameters(NODE, {"window": 50.0})
     described = client.call(
         GetTypeDescription,
-        f"{IDENTIFIER}/get_type_description",
+        f"{NODE}/get_type_description",
         GetTypeDescription.Request(type_name="none"),
     )
     assert not described.successful  # it knows no such type, and says so
@@ -146,13 +146,13 @@ def test_the_version_of_rclpy_has_been_tried():
     )
 
 
-def change(client, transition):
+def change(client, transition, node=NODE):
     request = ChangeState.Request(transition=Transition(id=transition))
-    return client.call(ChangeState, f"{IDENTIFIER}/change_state", request).success
+    return client.call(ChangeState, f"{node}/change_state", request).success
 
 
 def state(client):
-    return client.call(GetState, f"{IDENTIFIER}/get_state", GetState.Request()).current_state.id
+    return client.call(GetState, f"{NODE}/get_state", GetState.Request()).current_state.id
 
 
 def test_life_cycle(live, compose):
@@ -191,7 +191,7 @@ def test_a_wrong_parameter_leaves_the_node_unconfigured(live, compose):
     with spun(compose(lifecycle=True, warn_ratio=3.0), TurnExecutor(context=compose.context)):
         assert not change(client, Transition.TRANSITION_CONFIGURE)
         assert state(client) == State.PRIMARY_STATE_UNCONFIGURED
-        client.set_parameters(IDENTIFIER, {"warn_ratio": 1.5})
+        client.set_parameters(NODE, {"warn_ratio": 1.5})
         assert change(client, Transition.TRANSITION_CONFIGURE)
 
 
@@ -199,10 +199,6 @@ def test_pages_rest_with_the_node(live):
     port = free_port()
     live.start("dashboard", {"port": port, "lifecycle": True}, namespace=None)
     client = live.client
-
-    def change(transition):
-        request = ChangeState.Request(transition=Transition(id=transition))
-        assert client.call(ChangeState, "/dashboard/change_state", request).success
 
     def page():
         try:
@@ -215,10 +211,35 @@ def test_pages_rest_with_the_node(live):
 
     client.wait_until(lambda: page() == 503, "a page of a dashboard at rest")
     for _ in range(2):
-        change(Transition.TRANSITION_CONFIGURE)
-        assert page() == 503
-        change(Transition.TRANSITION_ACTIVATE)
-        assert page() == 200
-        change(Transition.TRANSITION_DEACTIVATE)
-        assert page() == 503
-        change(Transition.TRANSITION_CLEANUP)
+        for transition, code in (
+            (Transition.TRANSITION_CONFIGURE, 503),
+            (Transition.TRANSITION_ACTIVATE, 200),
+            (Transition.TRANSITION_DEACTIVATE, 503),
+            (Transition.TRANSITION_CLEANUP, 503),
+        ):
+            assert change(client, transition, "/dashboard")
+            assert page() == code
+
+
+PAGE = PROJECT / "doc" / "reference" / "nodes.md"
+
+
+@pytest.mark.parametrize(
+    ("node", "some"),
+    [
+        ("identifier", {"stem_command", "~/friction/mass", "~/identify"}),
+        ("simulator", {"actuator_pressure", "stem_state"}),
+        ("pressure_source", {"actuator_pressure"}),
+        ("stroke_player", {"stem_state", "pressure_set_point", "~/start", "~/stop"}),
+        ("dashboard", {"/diagnostics"}),
+    ],
+)
+def test_each_topic_and_service_has_a_meaning(node, some):
+    found = graph_of(node)
+    assert some <= {name for names in found.values() for name in names}
+    page = PAGE.read_text(encoding="utf-8")
+    for kind, names in found.items():
+        if names:
+            assert f"```{{node-graph}} {node} {kind}\n" in page
+            text = graph_as_markdown(node, kind)
+            assert all(name.rpartition("/")[2] in text for name in names)

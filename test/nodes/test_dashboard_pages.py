@@ -17,7 +17,7 @@ from urllib.parse import parse_qs, quote, urlsplit
 
 import pytest
 from browser import Tab, axe_violations, chromium
-from live_nodes import NAMESPACE, SECOND, START, buffered
+from live_nodes import NAMESPACE, NODE, SECOND, START, buffered
 from local_server import free_port
 from records import quick_record
 
@@ -28,7 +28,6 @@ from valve_friction_ros.model import HIGH_FRICTION
 pytest.importorskip("nicegui", reason="NiceGUI is not installed")
 
 TAG = "<img src=x onerror=alert(1)>"
-NODE = f"{NAMESPACE}/identifier"
 VALVE = f"/valve?node={quote(NODE)}"
 SILENCE = 8.0
 """Long enough for a slow machine."""
@@ -46,6 +45,7 @@ def plant(shared):
         lambda: "ready: open" in shared.dashboard.errors + shared.dashboard.output, "the server"
     )
     shared.address = f"http://127.0.0.1:{port}"
+    shared.history = HistoryFile(shared.folder / "valve_friction_ros" / "history.sqlite")
     return shared
 
 
@@ -168,25 +168,17 @@ def test_keys_alone_lead_to_a_valve(tab):
     page.wait_for_selector(".vf-valve")
 
 
-@pytest.mark.parametrize("path", ["/", "/?view=tiles", "/alarms", VALVE, "/compare"])
-def test_a_page_is_as_wide_as_its_window(tab, path):
-    page = tab.open(path)
-    page.wait_for_selector(".vf-row, .vf-tile, .vf-valve, .vf-compare, .vf-alarms")
-    for width in (2560, 1400, 390):
-        page.set_viewport_size({"width": width, "height": 900})
-        page.wait_for_function("document.documentElement.scrollWidth <= innerWidth")
-
-
 @pytest.mark.parametrize("theme", ["light", "dark"])
 @pytest.mark.parametrize(
     "path", ["/", "/?view=tiles", "/alarms", "/alarms?view=events", VALVE, "/compare"]
 )
-def test_axe_finds_nothing_wrong(tab, path, theme):
+def test_a_page_fits_its_window_and_axe_finds_nothing_wrong(tab, path, theme):
     join = "&" if "?" in path else "?"
     page = tab.open(f"{path}{join}theme={theme}")
     page.wait_for_selector(".vf-row, .vf-tile, .vf-valve, .vf-compare, .vf-alarms")
-    for width in (1400, 390):
+    for width in (2560, 1400, 390):
         page.set_viewport_size({"width": width, "height": 900})
+        page.wait_for_function("document.documentElement.scrollWidth <= innerWidth")
         assert axe_violations(page) == []
 
 
@@ -314,7 +306,7 @@ def test_a_baseline_is_set_only_when_it_is_agreed(tab):
 
 
 @pytest.mark.usefixtures("identified")
-def test_a_baseline_is_restored(tab):
+def test_a_baseline_is_restored_and_a_refusal_is_told(tab):
     page = tab.open(VALVE)
     page.locator(".vf-sub").first.wait_for()
     page.get_by_role("button", name="Restore baseline …").click()
@@ -324,11 +316,6 @@ def test_a_baseline_is_restored(tab):
     dialog.get_by_role("button", name="Restore baseline").click()
     page.get_by_text("Restore baseline: baseline: none").wait_for()
     page.locator(".vf-sub").first.wait_for(state="detached")
-
-
-@pytest.mark.usefixtures("identified")
-def test_a_refusal_is_told(tab):
-    page = tab.open(VALVE)
     page.get_by_role("button", name="Restore baseline …").click()
     page.locator(".vf-dialog").get_by_role("button", name="Restore baseline").click()
     page.get_by_text("there is no ~/set_baseline to undo").wait_for()
@@ -450,11 +437,10 @@ def test_an_alarm_is_acknowledged_with_a_name_and_exported(identified, tab):
 )
 def test_of_many_those_near_the_view_are_drawn(plant, tab, path, line):
     """All come as the page is scrolled."""
-    history = HistoryFile(plant.folder / "valve_friction_ros" / "history.sqlite")
     shown = Condition(Level.ERROR, StatusSignal.FAILURE, "excess friction")
     for number in range(400):
         valve = KeptValve(f"/many/fv_{number}/identifier", f"MANY-{number}")
-        follow_alarms(history, valve, {AlarmKind.FRICTION_HIGH: shown}, time.time_ns())
+        follow_alarms(plant.history, valve, {AlarmKind.FRICTION_HIGH: shown}, time.time_ns())
     page = tab.open(path)
     lines = page.locator(line)
     page.get_by_text("more below").wait_for()
@@ -467,18 +453,19 @@ def test_of_many_those_near_the_view_are_drawn(plant, tab, path, line):
 
 def test_an_alarm_of_a_valve_without_alarm_services_is_answered(plant, tab):
     """An identifier beside twenty others offers none; it follows the file of the history."""
-    history = HistoryFile(plant.folder / "valve_friction_ros" / "history.sqlite")
     node = "/crowd/fv_1/identifier"
     shown = Condition(Level.ERROR, StatusSignal.FAILURE, "excess friction")
     valve = KeptValve(node, "CROWD-1")
-    follow_alarms(history, valve, {AlarmKind.FRICTION_HIGH: shown}, time.time_ns())
+    follow_alarms(plant.history, valve, {AlarmKind.FRICTION_HIGH: shown}, time.time_ns())
     page = tab.open("/alarms?area=/crowd")
     row = page.locator("tr", has_text="friction high")
     row.get_by_role("button", name="Acknowledge").click()
     page.get_by_label("Your name").fill("A. Operator")
     page.get_by_role("button", name="Confirm").click()
     row.get_by_text("acknowledged by A. Operator").wait_for()
-    assert read_alarms(history, node)[AlarmKind.FRICTION_HIGH].state is AlarmState.ACKNOWLEDGED
+    assert (
+        read_alarms(plant.history, node)[AlarmKind.FRICTION_HIGH].state is AlarmState.ACKNOWLEDGED
+    )
 
 
 def test_what_cannot_be_called_says_so(tab):

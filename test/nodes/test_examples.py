@@ -16,14 +16,13 @@ import math
 import socket
 import struct
 import threading
-import time
 from datetime import datetime, timedelta, timezone
 from functools import reduce
 
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from live_nodes import NAMESPACE, PROJECT, STREAM, stamp_of
+from live_nodes import NAMESPACE, NODE, PROJECT, STREAM, stamp_of
 from local_server import free_port
 from records import quick_record
 from sensor_msgs.msg import FluidPressure, JointState
@@ -132,39 +131,6 @@ class ModbusDevice(LoopThread):
 def modbus_parameters(port, **others):
     places = {"device": 7, "pressure_register": FIRST, "position_register": POSITION}
     return {"host": "127.0.0.1", "port": port, "longest": 10.0} | places | others
-
-
-@needs("pymodbus")
-@pytest.mark.slow
-def test_a_valve_behind_a_device_is_identified(live):
-    """The device says what the recorded valve does at the time of each request."""
-    record, valve, times = recorded()
-    begun = []
-
-    def now():
-        elapsed = time.monotonic() - begun[0] if begun else 0.0
-        return (
-            np.interp(elapsed, times, record.pressure / 1e5),
-            np.interp(elapsed, times, 100 * record.position / valve.travel),
-        )
-
-    port = free_port()
-    device = ModbusDevice(port, now)
-    live.start_identifier({**SENSOR, "diaphragm_area": valve.diaphragm_area})
-    given = modbus_parameters(port, position_scale=valve.travel / 100, rate=100.0)
-    live.start("modbus_gateway", given, script=EXAMPLES / "modbus_gateway.py")
-    live.client.wait_until(
-        lambda: int(live.client.status_values()["buffered_samples"]) > 20, "the first samples"
-    )
-    begun.append(time.monotonic())
-    live.client.wait_until(lambda: time.monotonic() > begun[0] + times[-1], "the end of the record")
-    assert live.client.trigger("identify").success
-    values = live.client.last_values()
-    value, half = (float(values[f"coulomb_friction{what} [N]"]) for what in ("", " half width"))
-    assert value == pytest.approx(400.0, abs=1.5 * half)
-    assert half < 100.0
-    assert set(device.requests) == {(4, FIRST, POSITION + 2 - FIRST)}
-    device.close()
 
 
 @needs("pymodbus")
@@ -374,7 +340,6 @@ def test_a_record_of_a_server_is_identified(server, live):
     assert float(values["coulomb_friction [N]"]) == pytest.approx(400.0, rel=0.02)
 
 
-NODE = f"{NAMESPACE}/identifier"
 DI, OWN = "http://opcfoundation.org/UA/DI/", "urn:valve_friction_ros:health"
 
 
@@ -520,8 +485,7 @@ def test_the_small_dashboard_shows_a_valve_and_what_becomes_of_it(live):
     shown = live.start("worst_valves", script=EXAMPLES / "worst_valves.py", namespace=None)
     client = live.client
     client.wait_until(lambda: "OK    FV-101" in shown.output, "the valve")
-    client.identified(quick_record())
-    assert client.trigger("set_baseline").success
+    client.set_baseline(quick_record())
     client.identified(quick_record(HIGH_FRICTION))
     client.wait_until(lambda: "ERROR FV-101" in shown.output, "the alarm")
     assert shown.output.splitlines()[-1].split()[2:5] == ["NE", "107", "F"]

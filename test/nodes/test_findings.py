@@ -9,57 +9,36 @@
 
 """What an identifier finds of the friction and of the whole valve, against a baseline, over DDS."""
 
-import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from live_nodes import NAMESPACE, SECOND, START, values_of
-from records import quick_record, simulated, square_record, stroked_record
+from live_nodes import ERROR, NODE, OK, SECOND, START, WARN, values_of
+from records import quick_record, simulated, stroked_record
 
-from valve_friction_ros.health import Baseline
-from valve_friction_ros.identification import identify
 from valve_friction_ros.model import BENCH_VALVE, HIGH_FRICTION, LOW_FRICTION, SensorNoise
 
-NODE = f"{NAMESPACE}/identifier"
-OK, WARN, ERROR = b"\x00", b"\x01", b"\x02"
 LIMITS = {"warn_ratio": 1.5, "error_ratio": 2.0, "low_ratio": 0.5}
 
 
 @pytest.fixture(scope="module")
 def healthy(shared):
     """An identifier whose baseline is its own estimate of the healthy valve."""
-    shared.start_identifier()
-    client = shared.client
-    refused = client.trigger("set_baseline")
-    client.identified(quick_record())
-    accepted = client.trigger("set_baseline")
-    return client, refused, accepted
+    client = shared.client_of_identifier()
+    client.set_baseline(quick_record())
+    return client
 
 
 @pytest.fixture
 def client(healthy):
-    client, *_ = healthy
-    assert client.set_together(NODE, LIMITS).successful
-    return client
+    assert healthy.set_together(NODE, LIMITS).successful
+    return healthy
 
 
 def valve_with(coulomb_friction):
     return replace(
         LOW_FRICTION, coulomb_friction=coulomb_friction, static_friction=coulomb_friction
     )
-
-
-def test_baseline_needs_an_estimate(healthy):
-    _, refused, accepted = healthy
-    assert not refused.success
-    assert "the valve has no result" in refused.message
-    assert accepted.success
-    result = identify(quick_record(), BENCH_VALVE)
-    taken = "by the identification of 2023-11-14 22:13 UTC"
-    assert accepted.message == f"baseline: {Baseline.of(result)}; previous: none ({taken})"
-    healthy = result.parameters["coulomb_friction"]
-    assert healthy.interval[0] < 152.7 < healthy.interval[1]
 
 
 @pytest.mark.parametrize(
@@ -76,24 +55,19 @@ def test_verdict(client, parameters, ratio, level, signal, words):
     """More dry friction alone shows in F_c; ten times the viscous friction in both together."""
     message = client.identified(quick_record(parameters))
     status = client.statuses[-1][1]
-    assert status.level == level
-    assert words in status.message
     assert status.message == message
     values = values_of(status)
-    of = values["friction_ratio of"]
+    assert (status.level, values["NE 107"]) == (level, signal)
+    of, told, near = "coulomb_friction", "coulomb friction", 2e-3
     if ratio is None:
         speed = float(values["baseline_sliding_friction speed [m/s]"])
-        told = f"sliding friction at {speed * 1e3:.2g} mm/s"
-        assert of == "sliding_friction"
+        # With more friction the stem is slower, and between two speeds friction may have fallen.
+        of, told, near = "sliding_friction", f"sliding friction at {speed * 1e3:.2g} mm/s", 2e-2
         tight, loose = (float(one.sliding_friction(speed)) for one in (parameters, LOW_FRICTION))
         ratio = tight / loose
-    else:
-        told = "coulomb friction"
-        assert of == "coulomb_friction"
-    assert f"{told} is {float(values['friction_ratio']):.2f} (" in status.message
-    assert values["NE 107"] == signal
-    # With more friction the stem is slower, and between two speeds friction may have fallen.
-    near = 2e-3 if of == "coulomb_friction" else 2e-2
+    assert values["friction_ratio of"] == of
+    assert words in message
+    assert f"{told} is {float(values['friction_ratio']):.2f} (" in message
     assert float(values["friction_ratio"]) == pytest.approx(ratio, rel=near)
     assert float(values["baseline_coulomb_friction [N]"]) == pytest.approx(152.7, rel=1e-3)
     low, high = (float(values[f"friction_ratio {end}"]) for end in ("low", "high"))
@@ -112,59 +86,6 @@ def test_limits_are_parameters_and_judge_at_once(client):
     ):
         assert client.set_together(NODE, limits).successful
         client.next_status(lambda status, wanted=level: status.level == wanted, str(level))
-
-
-def test_parameter_shows_the_baseline_of_the_service_and_replaces_it(live):
-    live.start_identifier()
-    client = live.client
-    client.identified(quick_record())
-    assert client.trigger("set_baseline").success
-    (shown,) = client.parameters(NODE, "baseline_coulomb_friction")
-    told = float(client.last_values()["baseline_coulomb_friction [N]"])
-    assert shown == pytest.approx(told, rel=1e-8)
-    assert float(client.last_values()["baseline half width [N]"]) > 0
-
-    assert client.set_together(NODE, {"baseline_coulomb_friction": 100.0}).successful
-    values = client.status_values(
-        lambda status: values_of(status)["baseline_coulomb_friction [N]"] == "100", "100 N"
-    )
-    assert values["baseline half width [N]"] == "0"
-    assert client.set_together(NODE, {"baseline_coulomb_friction": math.nan}).successful
-    client.next_status(
-        lambda status: "baseline_coulomb_friction [N]" not in values_of(status), "no baseline"
-    )
-
-
-SQUARE = square_record()
-
-
-def test_an_alarm_by_the_sliding_friction_where_the_coulomb_friction_is_vague(live):
-    """A square wave behind a lag: F_c is weak, and the sliding friction serves instead."""
-    live.start_identifier({"timing_uncertainty": 0.02})
-    client = live.client
-    client.identified(SQUARE)
-    values = client.last_values()
-    assert values["coulomb_friction verdict"] == "weak"
-    assert client.trigger("set_baseline").success
-    known = float(client.last_values()["baseline_sliding_friction [N]"])
-    grown = replace(
-        HIGH_FRICTION,
-        coulomb_friction=1.6 * HIGH_FRICTION.coulomb_friction,
-        static_friction=1.6 * HIGH_FRICTION.static_friction,
-        viscous_friction=1.6 * HIGH_FRICTION.viscous_friction,
-    )
-    client.identified(square_record(grown))
-    status = client.statuses[-1][1]
-    assert status.level == WARN
-    values = values_of(status)
-    assert values["friction_ratio of"] == "sliding_friction"
-    assert "friction has grown: sliding friction at " in status.message
-    low, high = (float(values[f"friction_ratio {end}"]) for end in ("low", "high"))
-    assert 1.25 < low < 1.6 < high
-    assert float(client.friction("friction_ratio")["friction_ratio"]) == pytest.approx(
-        float(values["friction_ratio"])
-    )
-    assert known == pytest.approx(float(values["baseline_sliding_friction [N]"]))
 
 
 NARROW = {"warn_ratio": 1.25, "error_ratio": 1.5, "low_ratio": 0.5}
@@ -189,8 +110,7 @@ def test_an_alarm_ends_by_a_sure_result_only_also_over_a_restart(live):
         client.identified(record)
         return client.statuses[-1][1]
 
-    status_after(HEALTHY)
-    assert client.trigger("set_baseline").success
+    client.set_baseline(HEALTHY)
     assert status_after(TIGHT).level == ERROR
 
     unsure = status_after(UNSURE)
@@ -216,7 +136,6 @@ def test_an_alarm_ends_by_a_sure_result_only_also_over_a_restart(live):
     assert status.message.startswith("friction has fallen: ")
 
 
-HEALTHY = quick_record()
 SOFT = replace(LOW_FRICTION, spring_constant=LOW_FRICTION.spring_constant * 2 / 3)
 WEAK = quick_record(SOFT)
 HARDLY = SensorNoise(3e-5, 300.0, 3).applied_to(
@@ -271,8 +190,7 @@ def test_lost_travel_is_said_though_its_record_is_refused(live, history, is_sche
     """A sixth of the travel is lost: no model follows the record, but the stem's end is seen."""
     node = live.start_identifier()
     client = live.client
-    client.identified(stroked_record())
-    assert client.trigger("set_baseline").success
+    client.set_baseline(stroked_record())
     assert client.next_status().level == OK
     if is_scheduled:
         client.set_parameters(NODE, {"period": 0.5})
@@ -300,10 +218,8 @@ def test_lost_travel_is_said_though_its_record_is_refused(live, history, is_sche
 def test_a_restored_baseline_brings_all_its_numbers_back(live):
     node = live.start_identifier({"baseline_in_alarm": True})
     client = live.client
-    client.identified(HEALTHY)
-    assert client.trigger("set_baseline").success
-    client.identified(WEAK)
-    assert client.trigger("set_baseline").success
+    client.set_baseline(HEALTHY)
+    client.set_baseline(WEAK)
     assert client.next_status(lambda one: one.level == OK, "a new baseline")
     live.kill(node)
 
@@ -315,10 +231,8 @@ def test_a_restored_baseline_brings_all_its_numbers_back(live):
 
 
 def test_a_limit_is_a_parameter_and_a_given_friction_says_nothing_of_the_spring(live):
-    live.start_identifier({"spring_change": 0.5, "spring_failure": 0.6})
-    client = live.client
-    client.identified(HEALTHY)
-    assert client.trigger("set_baseline").success
+    client = live.client_of_identifier({"spring_change": 0.5, "spring_failure": 0.6})
+    client.set_baseline(HEALTHY)
     client.identified(WEAK)
     assert client.statuses[-1][1].level == OK
     (refused,) = client.set_parameters(NODE, {"spring_change": 0.7})
@@ -338,10 +252,8 @@ def still(place, pressures, begin):
 
 def test_a_seized_stem_is_an_alarm_until_it_moves(live):
     record = quick_record()
-    live.start_identifier({"window": 3600.0})
-    client = live.client
-    client.identified(record)
-    assert client.trigger("set_baseline").success
+    client = live.client_of_identifier({"window": 3600.0})
+    client.set_baseline(record)
     assert client.next_status().level == OK
     middle = 0.5 * float(record.position.min() + record.position.max())
     resting, supply = float(np.median(record.pressure)), float(record.pressure.max())
@@ -365,8 +277,7 @@ UNSTATED = dict.fromkeys(
 
 
 def test_what_nobody_has_stated_is_said_until_somebody_does(live):
-    live.start_identifier(UNSTATED)
-    client = live.client
+    client = live.client_of_identifier(UNSTATED)
     assert client.parameters(NODE, *UNSTATED) == [None] * len(UNSTATED)
     client.identified(quick_record())
     values = client.last_values()
@@ -388,8 +299,7 @@ def test_what_nobody_has_stated_is_said_until_somebody_does(live):
 def test_stated_data_are_compared_with_the_record(live):
     """The file of a valve says it as the file of a command does."""
     spring = LOW_FRICTION.spring_constant
-    live.start_identifier({"spring_constant": spring / 2, "mass": 1.542})
-    client = live.client
+    client = live.client_of_identifier({"spring_constant": spring / 2, "mass": 1.542})
     client.identified(quick_record())
     values = client.last_values()
     assert ("N/m from the record but stated as 102500 N/m: check diaphragm_area") in values[

@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 
 from valve_friction_ros.identification import RefusalError
-from valve_friction_ros.nodes.identifier.alarm_recorder import remove_oldest
+from valve_friction_ros.nodes.identifier.recordings import remove_oldest
 from valve_friction_ros.nodes.plumbing.output_folder import (
     OutputFolder,
     folder_of,
@@ -97,13 +97,12 @@ def test_trouble_with_the_disk_is_refused(tmp_path):
         raise OSError(errno.ENOSPC, "No space left on device")
 
 
-@pytest.mark.parametrize("bug", [RuntimeError("a bug"), ValueError("a bug")])
-def test_a_bug_is_not_blamed_on_the_folder(tmp_path, bug):
+def test_a_bug_is_not_blamed_on_the_folder(tmp_path):
     with (
-        pytest.raises(type(bug), match=r"^a bug$"),
+        pytest.raises(RuntimeError, match=r"^a bug$"),
         OutputFolder(str(tmp_path), "reports", "a report").opened(),
     ):
-        raise bug
+        raise RuntimeError("a bug")
 
 
 def test_a_link_has_the_name_that_it_has_wherever_it_leads(tmp_path):
@@ -113,39 +112,32 @@ def test_a_link_has_the_name_that_it_has_wherever_it_leads(tmp_path):
     assert free_path(tmp_path, NAME, ".html") == tmp_path / f"{NAME}_2.html"
 
 
-class TestRoom:
+TAKEN = 4 * 4096
+
+
+@pytest.fixture
+def folder(tmp_path):
     """A page of two blocks of 4,096 bytes, and a bag of two files of one block each."""
+    (tmp_path / f"{NAME}.html").write_bytes(b"x" * 4097)
+    bag = tmp_path / f"{NAME}_2"
+    bag.mkdir()
+    for name in ("metadata.yaml", "bag.mcap"):
+        (bag / name).write_bytes(b"x")
+    for other in ("fv_1011", "afv_101", "fv_101_a"):  # of other valves
+        (tmp_path / f"{other}_20260102T030405Z.html").write_bytes(b"x" * 100_000)
+    (tmp_path / "fv_101_notes.html").write_bytes(b"x" * 100_000)
+    (bag / "link").symlink_to(tmp_path / "fv_101_notes.html")
+    return tmp_path
 
-    TAKEN = 4 * 4096
 
-    @pytest.fixture
-    def folder(self, tmp_path):
-        (tmp_path / f"{NAME}.html").write_bytes(b"x" * 4097)
-        bag = tmp_path / f"{NAME}_2"
-        bag.mkdir()
-        for name in ("metadata.yaml", "bag.mcap"):
-            (bag / name).write_bytes(b"x")
-        for other in ("fv_1011", "afv_101", "fv_101_a"):  # of other valves
-            (tmp_path / f"{other}_20260102T030405Z.html").write_bytes(b"x" * 100_000)
-        (tmp_path / "fv_101_notes.html").write_bytes(b"x" * 100_000)
-        (bag / "link").symlink_to(tmp_path / "fv_101_notes.html")
-        return tmp_path
-
-    def test_there_is_room(self, folder):
-        require_room(folder, "fv_101", self.TAKEN + 1)
-
-    def test_what_has_just_been_written_may_fill_it(self, folder):
-        require_room(folder, "fv_101", self.TAKEN, is_there=True)
-        with pytest.raises(RefusalError, match="with this one"):
-            require_room(folder, "fv_101", self.TAKEN - 1, is_there=True)
-
-    def test_there_is_none(self, folder):
-        told = (
-            f"no space left: fv_101 uses 0.0164 MB in {folder}, and save_megabytes is "
-            "0.016384: move"
-        )
-        with pytest.raises(RefusalError, match=f"^{re.escape(told)}"):
-            require_room(folder, "fv_101", self.TAKEN)
+def test_a_file_needs_room_which_it_may_fill(folder):
+    require_room(folder, "fv_101", TAKEN + 1)
+    require_room(folder, "fv_101", TAKEN, is_there=True)
+    told = f"no space left: fv_101 uses 0.0164 MB in {folder}, and save_megabytes is 0.016384: move"
+    with pytest.raises(RefusalError, match=f"^{re.escape(told)}"):
+        require_room(folder, "fv_101", TAKEN)
+    with pytest.raises(RefusalError, match="with this one"):
+        require_room(folder, "fv_101", TAKEN - 1, is_there=True)
 
 
 NAMES = [

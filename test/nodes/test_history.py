@@ -13,7 +13,7 @@ import math
 
 import pytest
 from histories import DAY, START, VALVE, as_kept, success
-from live_nodes import NAMESPACE, values_of
+from live_nodes import NODE, OK, WARN, values_of
 from records import quick_record
 
 from valve_friction_ros.health import Baseline, DatedNumber, SlidingFriction
@@ -31,9 +31,6 @@ from valve_friction_ros.history.status_values import trend_values
 from valve_friction_ros.identification import identify
 from valve_friction_ros.model import BENCH_VALVE
 
-NODE = f"{NAMESPACE}/identifier"
-OK, WARN = b"\x00", b"\x01"
-PATIENT = {"input_timeout": 600.0}
 RECORD = quick_record()
 RESULT = identify(RECORD, BENCH_VALVE)
 EXPECTED = as_kept(RESULT.parameters["coulomb_friction"])
@@ -50,8 +47,7 @@ def first_values(live):
 
 
 def test_success_and_refusal_are_kept(live, history):
-    live.start_identifier({**PATIENT, "valve_tag": "FV-101", "window": 70.0})
-    client = live.client
+    client = live.client_of_identifier({"valve_tag": "FV-101", "window": 70.0})
     refusal = client.trigger("identify").message
     client.identified(RECORD)
     entries = history.entries()
@@ -72,7 +68,7 @@ def test_success_and_refusal_are_kept(live, history):
 class TestBaseline:
     def test_a_parameter_comes_first(self, live, history):
         history.set_baseline(VALVE, KeptBaseline(Baseline(152.7, 1.0), START, START))
-        node = live.start_identifier({**PATIENT, "baseline_coulomb_friction": 140.0})
+        node = live.start_identifier({"baseline_coulomb_friction": 140.0})
         assert float(first_values(live)["baseline_coulomb_friction [N]"]) == 140.0
         (line,) = logged(live, node, "baseline coulomb friction 140 N")
         assert "from the parameter baseline_coulomb_friction" in line
@@ -82,7 +78,7 @@ class TestBaseline:
         """The parameter shows nan all the time; only setting it ends the baseline."""
         alone = Baseline(sliding=SlidingFriction(200.0, 4.0, 8e-3))
         history.set_baseline(VALVE, KeptBaseline(alone, START, START))
-        live.start_identifier(PATIENT)
+        live.start_identifier()
         key, client = "baseline_sliding_friction [N]", live.client
         assert first_values(live)[key] == "200"
         assert math.isnan(*client.parameters(NODE, "baseline_coulomb_friction"))
@@ -95,7 +91,7 @@ class TestBaseline:
 def test_retention(live, history):
     for day in (4000, 1):
         history.add(success(START - day * DAY))
-    live.start_identifier({**PATIENT, "history_days": 3000.0})
+    live.start_identifier({"history_days": 3000.0})
     live.client.trigger("identify")
     kept = [entry.time for entry in history.entries()]
     assert START - DAY in kept
@@ -107,7 +103,7 @@ def test_a_history_that_cannot_be_written(live, tmp_path):
     blocked = tmp_path / "blocked"
     blocked.touch()
     history = HistoryFile(blocked / "history.sqlite")
-    node = live.start_identifier({**PATIENT, "history_file": history.path})
+    node = live.start_identifier({"history_file": history.path})
     client = live.client
     cause = (
         f"the history is not being written: {history.path}: its folder is a file: check the folder"
@@ -147,7 +143,7 @@ def fill(history, drift, method):
 
 def test_a_drift_is_told_until_a_baseline_is_set(live, history):
     fill(history, 3.0, "plant")
-    live.start_identifier(PATIENT)
+    live.start_identifier()
     values = live.client.status_values()
     assert float(values["friction_drift [N/month]"]) == pytest.approx(3.0)
     assert 0 < float(values["friction_drift half width [N/month]"]) < 1
@@ -155,8 +151,7 @@ def test_a_drift_is_told_until_a_baseline_is_set(live, history):
     dates = [values[f"limit_expected {which}[date]"] for which in ("earliest ", "", "latest ")]
     assert dates == sorted(dates)
     assert dates[1].startswith("2027-01-2")  # 8.75 months after 2026-05-04
-    live.client.identified(RECORD)
-    assert live.client.trigger("set_baseline").success
+    live.client.set_baseline(RECORD)
     values = live.client.status_values()
     assert not [key for key in values if "drift" in key]
     assert math.isclose(float(values["friction_ratio"]), 1.0)
@@ -164,7 +159,7 @@ def test_a_drift_is_told_until_a_baseline_is_set(live, history):
 
 def test_a_drift_is_that_of_the_method_which_the_settings_call_for(live, history):
     fill(history, 3.0, "refined")
-    live.start_identifier(PATIENT)
+    live.start_identifier()
     assert not [key for key in live.client.status_values() if "drift" in key]
     assert live.client.set_together(NODE, {"method": "bench"}).successful
     live.client.trigger("identify")
@@ -204,8 +199,7 @@ def sent(client, history):
 def test_rows_arrive_and_wait_while_the_server_is_away(live, history, database, postgres):
     node = live.start_identifier({"history_url": database.url})
     client = live.client
-    client.identified(RECORD)
-    assert client.trigger("set_baseline").success
+    client.set_baseline(RECORD)
     values = sent(client, history)
     assert values["history_server"] == str(database)
     assert len(History(database).entries()) == len(history.entries())

@@ -13,15 +13,12 @@ import math
 
 import numpy as np
 import pytest
-from builtin_interfaces.msg import Time
-from live_nodes import NAMESPACE, SECOND, STREAM, stamps_of, values_of
+from live_nodes import SECOND, SimulatedClock, stamps_of, values_of
 from records import quick_record
-from rosgraph_msgs.msg import Clock
 
 from valve_friction_ros.identification import identify
 from valve_friction_ros.model import BENCH_VALVE, LOW_FRICTION
 
-NODE = f"{NAMESPACE}/identifier"
 RECORD = quick_record()
 STAMPS = stamps_of(RECORD)
 ONE_HOUR = 3600 * SECOND
@@ -29,8 +26,7 @@ ONE_HOUR = 3600 * SECOND
 
 @pytest.fixture(scope="module")
 def identifier(shared):
-    shared.start_identifier()
-    return shared.client
+    return shared.client_of_identifier()
 
 
 @pytest.fixture
@@ -210,23 +206,21 @@ def test_the_log_tells_a_clearing_right_after_a_bad_sample(live):
 @pytest.mark.parametrize("late", ["pressure", "stem"])
 def test_a_record_that_ended_long_ago_is_refused(live, late):
     """By the node's clock, whatever its stamps: of both signals, or of one that fell silent."""
-    live.start_identifier({"use_sim_time": True, "input_timeout": 3.0})
-    client = live.client
-    clock, now = client.node.create_publisher(Clock, "/clock", STREAM), 1_000
-    client.wait_until(clock.get_subscription_count, "a subscription to the clock")
+    client = live.client_of_identifier({"use_sim_time": True, "input_timeout": 3.0})
+    clock = SimulatedClock(client)
 
-    def clock_shows():
-        clock.publish(Clock(clock=Time(sec=now)))
-        return any(stamp.sec == now for stamp, _ in client.statuses[-2:])
+    def set_clock(second):
+        clock.now = second * SECOND
+        clock.run_until(
+            lambda: any(stamp.sec == second for stamp, _ in client.statuses[-2:]), "the time", 0
+        )
 
-    client.wait_until(clock_shows, "the time")
+    set_clock(1_000)
     client.identified(RECORD)
     estimate = client.last_values()
-    now += 59
-    client.wait_until(clock_shows, "a time within the window")
+    set_clock(1_059)  # within the window
     assert client.trigger("identify").success
-    now += 165
-    client.wait_until(clock_shows, "a time long after the record")
+    set_clock(1_224)
     after = STAMPS[-1] + 165 * SECOND
     if late == "pressure":
         client.send_stem(after, RECORD.position[0])

@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
-from live_nodes import NAMESPACE, PROJECT, SECOND, START, values_of
+from live_nodes import NAMESPACE, PROJECT, SECOND, START, WARN, values_of
 from records import quick_record
 from std_srvs.srv import Trigger
 
@@ -138,7 +138,6 @@ def test_a_valve_of_a_plant_takes_little_of_the_graph(live):
 
 
 RATE, WINDOW = 10_000, 20.0
-WARN = b"\x01"
 OWN, OTHERS = 10.0, 2.0
 """Most processor time, s, for the answer of the flooded valve, and before that of another: beside
 what taking the samples in costs."""
@@ -212,8 +211,7 @@ def test_a_storm_on_one_valve_is_bounded_work_and_leaves_the_other_its_turn(stor
 def test_lost_messages_are_a_warning_with_their_share_until_it_is_over(live):
     """A queue of ten takes a burst of a thousand."""
     depth = "qos_overrides./fv_101/actuator_pressure.subscription.depth"
-    live.start_identifier({depth: 10})
-    client = live.client
+    client = live.client_of_identifier({depth: 10})
     client.send_pressure(START, 1e5)
     client.next_status(lambda one: values_of(one)["buffered_pressures"] == "1", "the first")
     for number in range(1, 1001):

@@ -9,8 +9,6 @@
 
 """A valve in service over DDS: its usage, moves and answers to commands, counted and kept."""
 
-import subprocess
-import sys
 from dataclasses import replace
 from datetime import date
 from pathlib import Path
@@ -18,7 +16,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from histories import VALVE
-from live_nodes import NAMESPACE, PROJECT, SECOND, START, STREAM, time_of, values_of
+from live_nodes import NAMESPACE, NODE, OK, SECOND, START, STREAM, WARN, command, time_of, values_of
 from rclpy.duration import Duration
 from records import quick_record
 from sensor_msgs.msg import JointState
@@ -29,8 +27,6 @@ from valve_friction_ros.history import HistoryFile, read_answers, read_moves, re
 from valve_friction_ros.model import BENCH_VALVE, LOW_FRICTION
 from valve_friction_ros.streams import DAY
 
-NODE = f"{NAMESPACE}/identifier"
-OK, WARN = b"\x00", b"\x01"
 TRAVEL = BENCH_VALVE.travel
 PERIOD = 10 * SECOND
 DISTANCE = "travelled_distance [m]"
@@ -89,8 +85,7 @@ def test_usage_is_shown_kept_and_goes_on(live, history):
 
 
 def test_a_renewed_packing_counts_anew(live, history):
-    live.start_identifier()
-    client = live.client
+    client = live.client_of_identifier()
     after = send(client, strokes(8))
     shown(client, "reversals", "7")
     answer = client.trigger("reset_usage")
@@ -155,8 +150,7 @@ def test_earlier_runs_that_cannot_be_read_at_first(live, tmp_path):
     blocked = tmp_path / "blocked"
     blocked.touch()
     history = HistoryFile(blocked / "history.sqlite")
-    live.start_identifier({"history_file": history.path})
-    client = live.client
+    client = live.client_of_identifier({"history_file": history.path})
     after = send(client, strokes(8))
     values = shown(client, "reversals", "7")
     assert values["usage"] == "for this run only, because the history cannot be read"
@@ -175,7 +169,6 @@ MINUTE = 60.0
 SECURE = {"timing_uncertainty": 0.01}
 CYCLE = np.array([0.42, 0.45, 0.48, 0.51, 0.48, 0.45]) * BUILT.travel
 MOVES = 48
-WARN = b"\x01"
 
 
 def serve(client, first, friction):
@@ -191,8 +184,7 @@ def number(values, key):
     return float(values.get(f"evidence {key}", "nan"))
 
 
-def test_it_adds_up_and_survives_a_kill(live, tmp_path):
-    history = HistoryFile(tmp_path / "valve_friction_ros" / "history.sqlite")
+def test_it_adds_up_and_survives_a_kill(live, history):
     node, client = live.start_identifier(SECURE), live.client
 
     def in_file():
@@ -200,6 +192,7 @@ def test_it_adds_up_and_survives_a_kill(live, tmp_path):
 
     refused = client.trigger("set_baseline")
     assert not refused.success
+    assert refused.message.startswith("the valve has no result")
     assert "moves in service cannot be the baseline yet: 0 moves up and 0 down" in refused.message
     serve(client, 0, 300.0)
     values = client.status_values(
@@ -214,9 +207,7 @@ def test_it_adds_up_and_survives_a_kill(live, tmp_path):
     answer = client.trigger("set_baseline")
     assert answer.success, answer.message
     assert "moves in service since 2023-11-14" in answer.message
-    node.kill()
-    live.nodes.remove(node)
-    client.watched.clear()
+    live.kill(node)
 
     kept = in_file()
     live.start_identifier(SECURE)
@@ -241,14 +232,12 @@ def test_it_adds_up_and_survives_a_kill(live, tmp_path):
     assert "the valve is in WARN" in refused.message
 
 
-def test_the_newer_of_identification_and_moves_leads_and_is_the_baseline(live, tmp_path):
+def test_the_newer_of_identification_and_moves_leads_and_is_the_baseline(live, history):
     """A record of 300 N at 22:13 is followed by moves of 300 N, and then by moves of 450 N."""
     packing = replace(
         LOW_FRICTION, coulomb_friction=300.0, static_friction=300.0, viscous_friction=500.0
     )
-    history = HistoryFile(tmp_path / "valve_friction_ros" / "history.sqlite")
-    live.start_identifier(SECURE)
-    client = live.client
+    client = live.client_of_identifier(SECURE)
     client.identified(quick_record(packing))
     answer = client.trigger("set_baseline")
     assert answer.message.endswith("(by the identification of 2023-11-14 22:13 UTC)")
@@ -273,26 +262,14 @@ def test_the_newer_of_identification_and_moves_leads_and_is_the_baseline(live, t
     assert kept.numbers["spring_constant"].value == pytest.approx(2.05e5, rel=0.01)
 
 
-def test_another_actuator_makes_other_forces(shared):
-    shared.start_identifier()
-    client = shared.client
-    serve(client, 0, 300.0)
-    client.next_status(lambda status: number(values_of(status), "moves") > 40, "the moves")
-    node = f"{NAMESPACE}/identifier"
-    assert client.set_together(node, {"diaphragm_area": 0.05}).successful
-    client.next_status(lambda status: number(values_of(status), "moves") == 0, "no moves")
-
-
-def test_a_renewed_packing_and_a_wrong_stamp(live):
-    live.start_identifier(SECURE)
-    client = live.client
+def test_a_renewed_packing_a_wrong_stamp_and_another_actuator(live):
+    client = live.client_of_identifier(SECURE)
     serve(client, 0, 300.0)
     before = client.status_values(
         lambda status: number(values_of(status), "reference [N]") > 0, "a reference"
     )
     assert number(before, "reference [N]") == pytest.approx(300.0, rel=0.03)
-    node = f"{NAMESPACE}/identifier"
-    changed = client.set_together(node, {"travel": 0.03})
+    changed = client.set_together(NODE, {"travel": 0.03})
     assert changed.successful, changed.reason
     serve(client, -100_000, 300.0)
     left = client.status_values(
@@ -309,6 +286,8 @@ def test_a_renewed_packing_and_a_wrong_stamp(live):
     )
     assert number(after, "reference [N]") == pytest.approx(450.0, rel=0.03)
     assert "evidence change_ratio" not in after
+    assert client.set_together(NODE, {"diaphragm_area": 0.05}).successful  # makes other forces
+    client.next_status(lambda status: number(values_of(status), "moves") == 0, "no moves")
 
 
 RATE = 20
@@ -346,8 +325,7 @@ def answer(dead_time, lag):
 
 @pytest.mark.parametrize(("unit", "scale"), [("m", TRAVEL), ("'%'", 100.0)])
 def test_moves_in_service(live, unit, scale):
-    live.start_identifier({"command_unit": unit, "window": 3600.0})
-    client = live.client
+    client = live.client_of_identifier({"command_unit": unit, "window": 3600.0})
     assert "moves" not in client.status_values()
     commander(live)(scale)
     stamps, pressure, position = answer(1.0, 0.5)
@@ -369,7 +347,7 @@ def test_moves_in_service(live, unit, scale):
     assert "the actuator pressure itself responds late: check the positioner" in status.message
 
 
-def test_the_figures_outlive_a_kill(live, tmp_path):
+def test_the_figures_outlive_a_kill(live, history):
     """They are kept, shown by a node that hears no command yet, in its page and by a command."""
     slow = {"window": 3600.0, "dead_time_limit": 0.8}
     node, client = live.start_identifier(slow), live.client
@@ -381,8 +359,7 @@ def test_the_figures_outlive_a_kill(live, tmp_path):
         return status.level == WARN and values_of(status)["moves"] == "6"
 
     before = values_of(client.next_status(is_late, "a late stem"))
-    file = HistoryFile(tmp_path / "valve_friction_ros" / "history.sqlite")
-    client.wait_until(lambda: len(read_answers(file, NODE)) == 6, "the moves in the history")
+    client.wait_until(lambda: len(read_answers(history, NODE)) == 6, "the moves in the history")
     live.kill(node)
 
     live.start_identifier({**slow, "method": "bench"})
@@ -397,29 +374,9 @@ def test_the_figures_outlive_a_kill(live, tmp_path):
     page = Path(client.trigger("report").message).read_text(encoding="utf-8")
     assert "Answer to the command" in page
     assert "latest 6 steps of stem_command, from 2023-11-14 22:13 to 2023-11-14 22:14" in page
-    shown = subprocess.run(
-        [sys.executable, "-m", "valve_friction_ros", "history", str(file.path)],
-        cwd=PROJECT,
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=False,
-    )
+    shown = command("history", history.path)
     assert "stem_command: 6 steps, 0 ignored; medians: dead time 1" in shown.stdout, shown.stderr
     assert client.trigger("reset_usage").success
     client.status_values(lambda one: values_of(one)["moves"] == "0", "a new packing")
     assert client.next_status().level == OK
-    assert read_answers(file, NODE) == ()
-
-
-def test_without_a_command_nothing_is_said(live):
-    live.start_identifier({"dead_time_limit": 0.1, "window": 3600.0})
-    stamps, pressure, position = answer(0.5, 0.5)
-    live.client.send((stamps, pressure), (stamps, position))
-    live.client.wait_for_buffered(2 * stamps.size)
-    status = live.client.next_status()
-    shown = [
-        key for key in values_of(status) if not key.startswith(("evidence ", "baseline_lacks "))
-    ]
-    assert not [key for key in shown if "command" in key or "moves" in key]
-    assert "command" not in status.message
+    assert read_answers(history, NODE) == ()

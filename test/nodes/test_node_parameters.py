@@ -12,14 +12,22 @@
 import math
 import re
 
+import numpy as np
 import pytest
-from live_nodes import NAMESPACE, SECOND, STREAM, buffered, stamp_of, time_of
+from live_nodes import NAMESPACE, NODE, SECOND, WARN, SimulatedClock, buffered, stamp_of, values_of
 from rcl_interfaces.msg import ParameterType
-from records import quick_record
-from rosgraph_msgs.msg import Clock
+from records import quick_record, simulated
+from std_msgs.msg import Float64MultiArray
+
+from valve_friction_ros.identification import (
+    UNITS,
+    IdentificationSettings,
+    identify,
+    identify_signature,
+)
+from valve_friction_ros.model import BENCH_VALVE, HIGH_FRICTION, TriangleWave
 
 NODES = ("identifier", "simulator", "pressure_source")
-NODE = f"{NAMESPACE}/identifier"
 OF_ROS = re.compile(r"use_sim_time|start_type_description_service|qos_overrides\..*")
 CHECKED_BY_RULE = {  # floating parameters that may be infinite or not given, so have no range
     "travel": -0.01,
@@ -53,6 +61,7 @@ BAD_CHANGES = [  # changes, words of the reason
     ({"mass": 1}, "mass: expected 'Type.DOUBLE' got 'Type.INTEGER'"),
     ({"window": -1.0}, "window"),
     ({"input_timeout": 0.0}, "input_timeout"),
+    ({"period": -1.0}, "period"),
     ({"derivative_window": 30}, "window must be odd"),
     ({"polynomial_order": 30}, "polynomial_order"),
     ({"polynomial_order": 20, "derivative_window": 21}, "at least order + 2 = 22"),
@@ -69,6 +78,8 @@ BAD_CHANGES = [  # changes, words of the reason
         "there is no method 'guess': choose from plant, bench, published, signature",
     ),
     ({"joint": "arm"}, "joint"),
+    ({"alarm_kind": "unknown"}, "alarm_kind"),
+    ({"alarm_hours": math.inf}, "alarm_hours"),
     ({"valve_tag": "FV-102"}, "valve_tag"),
     *(
         ({name: value}, f"read-only parameter: {name}")
@@ -90,8 +101,7 @@ BAD_CHANGES = [  # changes, words of the reason
 
 @pytest.fixture(scope="module")
 def client(shared):
-    shared.start_identifier()
-    return shared.client
+    return shared.client_of_identifier()
 
 
 def range_of(descriptor):
@@ -118,21 +128,6 @@ def test_every_parameter_is_described_with_its_unit_and_its_range(live, name):
             assert limits[0] < limits[1]
 
 
-def test_known_values_have_the_units_of_their_parameters(client):
-    units = {
-        "mass": "kg",
-        "viscous_friction": "N·s/m",
-        "coulomb_friction": "N",
-        "static_friction": "N",
-        "spring_constant": "N/m",
-        "spring_preload": "N",
-        "limit_velocity": "m/s",
-    }
-    descriptors = client.describe(NODE, [f"fixed.{name}" for name in units])
-    for (name, unit), descriptor in zip(units.items(), descriptors, strict=True):
-        assert descriptor.description.startswith(f"Known value of {name} [{unit}];")
-
-
 @pytest.mark.parametrize(
     ("changes", "words"), BAD_CHANGES, ids=["-".join(map(str, c.items())) for c, _ in BAD_CHANGES]
 )
@@ -155,7 +150,7 @@ def test_good_changes_take_effect_and_unrelated_parameters_stay_settable(client)
     width = (100.0 + (100.0 if math.isnan(static) else static)) / results["spring_constant"]
     assert results["dead_band"] == pytest.approx(width / 0.05, rel=1e-12)
     assert "coulomb_friction" in client.last_values()["fixed"].split(", ")
-    back = {"fixed.coulomb_friction": math.nan, "derivative_window": 31, "travel": 0.028575}
+    back = {"fixed.coulomb_friction": math.nan, "derivative_window": 0, "travel": 0.028575}
     assert client.set_together(NODE, back).successful
 
 
@@ -168,6 +163,63 @@ def test_new_window_empties_the_buffer_and_says_so(client):
     assert client.set_together(NODE, {"window": 60.0}).successful
 
 
+def signature_record():
+    """Five strokes of a quick triangle at 100 Hz."""
+    time = np.arange(5000) / 100
+    return simulated(TriangleWave(period=20.0).sample(time), 0.01, HIGH_FRICTION)
+
+
+def test_a_signature_is_identified(client):
+    assert client.set_together(NODE, {"method": "signature"}).successful
+    message = client.identified(signature_record())
+    assert "the stem ignores reversals smaller than 21 % of its travel" in message
+    expected = identify_signature(signature_record(), BENCH_VALVE, IdentificationSettings())
+    told = client.friction(*UNITS, "fit", "rms", "dead_band", "threshold")
+    for name in UNITS:
+        assert told[name] == pytest.approx(expected.values[name], rel=1e-9, nan_ok=True)
+    assert told["coulomb_friction"] == pytest.approx(606.0, rel=0.02)
+    assert told["fit"] == pytest.approx(expected.fit, rel=1e-9)
+    assert told["rms"] == pytest.approx(expected.rms, rel=1e-6)
+    width = told["coulomb_friction"] + told["static_friction"]
+    share = width / told["spring_constant"] / BENCH_VALVE.travel
+    assert told["dead_band"] == pytest.approx(share, rel=1e-9)
+    assert np.isnan(told["threshold"])
+    assert np.isnan([*client.published(*UNITS).values()]).all()
+    assert not client.latched(Float64MultiArray, f"{NODE}/sweep").data
+    values = values_of(client.next_status())
+    assert values["method"] == "signature"
+    assert values["estimate_valid"] == "true"
+    assert values["coulomb_friction verdict"] == "weak"
+    assert float(values["fit [%]"]) == pytest.approx(100 * expected.fit, rel=1e-8)
+
+
+def test_former_names_are_understood(client):
+    for former, used in (("robust", "plant"), ("refined", "bench"), ("best", "plant")):
+        assert client.set_together(NODE, {"method": former}).successful
+        client.identified(quick_record())
+        assert values_of(client.next_status())["method"] == used
+        expected = identify(quick_record(), BENCH_VALVE, method=used)
+        told = client.friction("coulomb_friction", "threshold")
+        assert told["coulomb_friction"] == expected.values["coulomb_friction"]
+        assert told["threshold"] == expected.evidence["threshold"]
+
+
+def test_the_timing_uncertainty_widens_the_intervals(client):
+    """Each lag has a prior of that width; on a square wave the record tells little of the lags."""
+    told = {}
+    for uncertainty in (0.0, 0.2):
+        assert client.set_together(NODE, {"timing_uncertainty": uncertainty}).successful
+        client.identified(quick_record())
+        told[uncertainty] = client.half_widths("viscous_friction")["viscous_friction"]
+        expected = identify(
+            quick_record(), BENCH_VALVE, IdentificationSettings(timing_uncertainty=uncertainty)
+        )
+        assert told[uncertainty] == expected.parameters["viscous_friction"].half_width
+    assert told[0.0] < told[0.2]
+    assert client.set_together(NODE, {"timing_uncertainty": np.nan}).successful
+    assert client.set_together(NODE, {"method": "plant"}).successful
+
+
 @pytest.mark.parametrize("text", [".nan", "nan"])
 def test_numbers_may_be_texts(client, text):
     """ros2 param load sends .nan and 1e-06 so."""
@@ -177,54 +229,29 @@ def test_numbers_may_be_texts(client, text):
     assert math.isnan(fixed)
 
 
-def test_no_clock_is_said(live):
-    live.start("identifier", {"use_sim_time": True})
-    client = live.client
-    status = client.next_status(lambda one: "no time on /clock" in one.message, "a warning")
-    assert status.level == b"\x01"
-    clock = client.node.create_publisher(Clock, "/clock", STREAM)
-
-    def is_quiet():
-        clock.publish(Clock(clock=time_of(5000 * SECOND)))
-        return "/clock" not in client.statuses[-1][1].message
-
-    client.wait_until(is_quiet, "a status without the warning")
-
-
 def test_simulated_time(live):
-    live.start_identifier()
-    client = live.client
-    clock = client.node.create_publisher(Clock, "/clock", STREAM)
-    (result,) = client.set_parameters(NODE, {"use_sim_time": True})
-    assert result.successful, result.reason
-    client.wait_until(clock.get_subscription_count, "a subscription to the clock")
+    """Without a clock it is missed; a clock that is set back empties the buffer."""
+    client = live.client_of_identifier()
+    assert client.set_together(NODE, {"use_sim_time": True}).successful
+    status = client.next_status(lambda one: "no time on /clock" in one.message, "a warning")
+    assert status.level == WARN
+    clock = SimulatedClock(client)
 
-    def run_clock_until(start, condition, what):
-        now = start
+    def run_until_stamped(begin, end):
+        clock.now, seen = begin, len(client.statuses)
+        clock.run_until(
+            lambda: any(begin <= stamp_of(at) < end for at, _ in client.statuses[seen:]),
+            f"a diagnostic from {begin} to {end}",
+        )
 
-        def met():
-            nonlocal now
-            now += SECOND // 20
-            clock.publish(Clock(clock=time_of(now)))
-            return condition()
-
-        client.wait_until(met, what)
-
-    def stamped_by(begin, end):
-        seen = len(client.statuses)
-        return lambda: any(begin <= stamp_of(stamp) < end for stamp, _ in client.statuses[seen:])
-
-    run_clock_until(
-        5000 * SECOND, stamped_by(5000 * SECOND, 6000 * SECOND), "a diagnostic by the clock"
-    )
+    run_until_stamped(5000 * SECOND, 6000 * SECOND)
+    assert "/clock" not in client.next_status().message
     client.send_record(quick_record())
     seen = len(client.statuses)
-    run_clock_until(
-        6000 * SECOND,
-        lambda: any(buffered(status) == 1000 for _, status in client.statuses[seen:]),
-        "all samples",
+    clock.run_until(
+        lambda: any(buffered(status) == 1000 for _, status in client.statuses[seen:]), "all samples"
     )
-    run_clock_until(1000 * SECOND, stamped_by(1000 * SECOND, 2000 * SECOND), "the clock set back")
+    run_until_stamped(1000 * SECOND, 2000 * SECOND)
     response = client.trigger("identify")
     assert not response.success
     assert "no samples" in response.message

@@ -14,7 +14,7 @@ import time
 import pytest
 import rclpy
 from histories import START, success
-from live_nodes import STREAM, values_of
+from live_nodes import OK, STREAM, WARN, values_of
 from sensor_msgs.msg import FluidPressure, JointState
 from waiting import PATIENCE
 
@@ -22,7 +22,6 @@ from benchmark.soak_plant import PERIOD, TOLD_WITHIN, Nonsense, said
 from valve_friction_ros.health import Baseline
 from valve_friction_ros.history import KeptBaseline, KeptValve
 
-OK, WARN = b"\x00", b"\x01"
 HEALTHY = Baseline(150.0, 3.0)
 SLOW, STILL, PLAYED = "slow", "still", "played"
 KINDS = {one.name.lower(): one for one in Nonsense}

@@ -9,9 +9,7 @@
 
 """Streams that are polled, and the executor that runs what is ready, over real DDS."""
 
-import threading
 import time
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -20,23 +18,16 @@ import waiting
 from live_nodes import SECOND, Client, Domain, time_of
 from rclpy.duration import Duration
 from rclpy.executors import SingleThreadedExecutor
-from rclpy.qos import QoSProfile
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import FluidPressure, JointState
 from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 from waiting import PATIENCE
 
-from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.nodes.identifier.valve_inputs import ValveInputs
-from valve_friction_ros.nodes.plumbing.polled_node import (
-    PolledNode,
-    TurnExecutor,
-    create_trigger_service,
-)
+from valve_friction_ros.nodes.plumbing.polled_node import PolledNode, TurnExecutor, create_service
 from valve_friction_ros.nodes.plumbing.polled_subscription import PolledSubscription
 from valve_friction_ros.nodes.plumbing.qos import blocks, stream
-from valve_friction_ros.nodes.plumbing.worker import done_in
 
 
 @pytest.fixture
@@ -115,21 +106,6 @@ def test_a_flood_is_taken_by_turns(bench):
     assert polled.losses.lost == other.losses.lost == 0
 
 
-def test_what_a_queue_lost_is_counted(bench):
-    node, _, client = bench
-    polled = PolledSubscription(node, Float64, "numbers", QoSProfile(depth=10))
-    send = sender(client, polled)
-    send(0)
-    assert [one.message.data for one in taken(polled, 1)] == [0]
-    send(*range(1, 1001))
-    last = wait_until(lambda: [one for one in polled.take() if one.message.data == 1000], "it")
-    assert last
-    losses = polled.losses
-    assert 0 < losses.lost == losses.recently_lost
-    assert losses.lost + losses.recently_taken == 1001
-    assert losses.share == losses.lost / 1001
-
-
 def test_one_signal_waits_for_the_other_that_has_more_than_its_share(bench):
     """Otherwise the stem would run ahead of its pressure."""
     node, _, client = bench
@@ -186,15 +162,6 @@ class TestTurn:
         wait_until(caller.service_is_ready, "the service")
         return [caller.call_async(Trigger.Request()) for _ in range(count)]
 
-    def answers(self, executor, client, requests):
-        def all_answered():
-            executor.turn()
-            client._executor.spin_once(timeout_sec=0.01)
-            return all(one.done() for one in requests)
-
-        wait_until(all_answered, "the answers")
-        return [(one.result().success, one.result().message) for one in requests]
-
     def test_one_answers_all_requests_that_wait(self, bench):
         node, executor, client = bench
         answered = []
@@ -203,7 +170,7 @@ class TestTurn:
             answered.append(1)
             return ""
 
-        create_trigger_service(node, "~/work", work)
+        create_service(node, "~/work", work)
         for _ in range(10):  # clients, each of which sends up to ten requests at once
             self.requests(client, 5)
         time.sleep(0.5)
@@ -221,55 +188,6 @@ class TestTurn:
         time.sleep(0.1)
         assert not executor.turn()
         assert ticks == [1]
-
-    def test_others_go_on_while_work_is_awaited(self, bench):
-        node, executor, client = bench
-        finish = threading.Event()
-        with ThreadPoolExecutor(max_workers=1) as pool:
-
-            async def work():
-                return f"worked {await done_in(pool, lambda: finish.wait(PATIENCE))}"
-
-            async def quick():
-                return "quick"
-
-            create_trigger_service(node, "~/work", work)
-            create_trigger_service(node, "~/quick", quick)
-            (slow,) = self.requests(client, 1)
-            wait_until(executor.turn, "the request")
-            assert executor.turn()  # it is awaited
-            quick_one = self.requests(client, 1, "/polled/quick")
-            assert self.answers(executor, client, quick_one) == [(True, "quick")]
-            assert not slow.done()
-            finish.set()
-            assert self.answers(executor, client, [slow]) == [(True, "worked True")]
-
-    def test_what_work_raises_is_answered(self, bench, capfd):
-        node, executor, client = bench
-
-        def refuse():
-            raise RefusalError("the stem did not move")
-
-        def fail():
-            raise KeyError("a bug")
-
-        with ThreadPoolExecutor(max_workers=1) as pool:
-            for name, work in (("refuse", refuse), ("fail", fail)):
-
-                async def in_pool(work=work):
-                    return await done_in(pool, work)
-
-                create_trigger_service(node, f"~/{name}", in_pool)
-            refusal, failure = (
-                self.answers(executor, client, self.requests(client, 1, f"/polled/{name}"))[0]
-                for name in ("refuse", "fail")
-            )
-        assert refusal == (False, "the stem did not move")
-        assert not failure[0]
-        assert failure[1].startswith("internal error: KeyError: 'a bug' (test_polling.py, line ")
-        errors = capfd.readouterr().err
-        assert errors.count("Traceback (most recent call last)") == 1
-        assert "in fail\n" in errors
 
     def test_what_a_callback_raises_is_kept_to_its_node(self, bench, capfd):
         node, executor, _ = bench

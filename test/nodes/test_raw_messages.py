@@ -21,7 +21,7 @@ from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import FluidPressure, JointState
 from std_msgs.msg import Header
 
-from valve_friction_ros.nodes.dashboard.node import status_of, statuses_in
+from valve_friction_ros.nodes.dashboard import status_of, statuses_in
 from valve_friction_ros.nodes.plumbing import messages
 from valve_friction_ros.nodes.plumbing.messages import (
     arrivals_of,
@@ -88,14 +88,15 @@ def joint_states(draw, count):
     return [message() for _ in range(count)]
 
 
-@given(frame=WORDS, samples=st.lists(st.tuples(TIMES, NUMBERS, NUMBERS), max_size=20))
-def test_pressures_of_one_publisher(frame, samples):
-    check_pressures(serialised(pressure(at, value, frame, more) for at, value, more in samples))
-
-
-@given(samples=st.lists(st.tuples(TIMES, NUMBERS, WORDS), max_size=8))
-def test_pressures_of_several_publishers(samples):
-    check_pressures(serialised(pressure(*sample) for sample in samples))
+@pytest.mark.parametrize("publishers", ["one", "several"])
+@given(frame=WORDS, samples=st.lists(st.tuples(TIMES, NUMBERS, WORDS, NUMBERS), max_size=20))
+def test_pressures(publishers, frame, samples):
+    check_pressures(
+        serialised(
+            pressure(at, value, frame if publishers == "one" else own, more)
+            for at, value, own, more in samples
+        )
+    )
 
 
 @settings(deadline=None)
@@ -248,20 +249,13 @@ def said(message="friction normal", age="1.0", ratio="1.02", count="5"):
     return DiagnosticStatus(name="/v/identifier: friction", message=message, values=values)
 
 
-def test_ages_and_counters_leave_the_mark():
+def test_a_mark_is_that_of_its_status_and_its_essential_keys():
+    """Ages and counters leave it, and so does a key within another one."""
     assert marks(said()) == marks(said(age="2.0", count="7"))
     assert marks(said()) != marks(said(ratio="1.03"))
     assert marks(said()) != marks(said(message="friction has grown"))
-
-
-def test_a_key_within_another_one_is_none():
     alike = DiagnosticStatus(values=[KeyValue(key="my friction_ratio", value="9")])
-    assert marks(alike) == marks(DiagnosticStatus())
-
-
-def test_each_status_of_an_array_has_its_own_mark():
-    empty, known = DiagnosticStatus(), said()
-    assert marks(empty, known) == [*marks(empty), *marks(known)]
+    assert marks(alike, said()) == [*marks(DiagnosticStatus()), *marks(said())]
 
 
 def test_bytes_between_the_texts_leave_the_mark():

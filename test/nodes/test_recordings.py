@@ -9,12 +9,9 @@
 
 """Recorded topics and saved buffers: the command reads out of them what the node found."""
 
-import itertools
 import json
 import math
 import re
-import subprocess
-import sys
 import time
 from dataclasses import asdict
 from pathlib import Path
@@ -25,11 +22,10 @@ import numpy as np
 import pytest
 import yaml
 from faulty_identifier import FINISH, FULL, SLOW, faulty
-from live_nodes import NAMESPACE, PROJECT, SECOND, STREAM, stamps_of, time_of
+from live_nodes import NAMESPACE, NODE, SECOND, STREAM, SimulatedClock, command, stamp_of, stamps_of
 from rclpy.duration import Duration
 from records import quick_record
 from rosbags.rosbag2 import Reader
-from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import FluidPressure, JointState
 from std_srvs.srv import Trigger
 
@@ -38,7 +34,6 @@ from valve_friction_ros.model import BENCH_VALVE
 from valve_friction_ros.streams import RecordBuffer
 
 WINDOW = 4.0
-IDENTIFIER = f"{NAMESPACE}/identifier"
 DAY = 86_400 * SECOND
 
 
@@ -53,15 +48,7 @@ class Run(NamedTuple):
 
 def identified(*arguments):
     """The one JSON object of the command, run as a person would."""
-    command = [sys.executable, "-m", "valve_friction_ros", "identify", "--json"]
-    done = subprocess.run(
-        [*command, *map(str, arguments)],
-        cwd=PROJECT,
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=False,
-    )
+    done = command("identify", "--json", *arguments)
     assert (done.returncode, done.stderr) == (0, "")
     return json.loads(done.stdout)
 
@@ -138,37 +125,32 @@ def test_a_recorded_run_gives_the_numbers_of_the_node(run):
     assert numbers_of(whole) != run.numbers  # its first second changes the numbers
 
 
+def last_stamp(client):
+    return stamp_of(client.statuses[-1][0]) if client.statuses else 0
+
+
 def test_a_played_bag_gives_the_numbers_of_the_live_run(run, live):
     """Its messages come on the topics, and a time of the day before on /clock."""
     live.start("identifier", {"window": WINDOW, "use_sim_time": True, "input_timeout": 600.0})
     client = live.client
     client.connect()
-    clock = client.node.create_publisher(Clock, "/clock", STREAM)
-    client.wait_until(clock.get_subscription_count, "a subscription to the clock")
+    clock = SimulatedClock(client)
     topics = {"actuator_pressure": client._pressure, "stem_state": client._stem}
-    shown = []
-
-    def tick(time):
-        shown.append(time)
-        clock.publish(Clock(clock=time_of(time)))
-
     with Reader(run.recorded) as bag:
         messages = [*bag.messages()]
-        earlier = itertools.count(messages[0][1] - DAY - 60 * SECOND, SECOND // 10)
-        client.wait_until(  # the node's time is that of /clock before the first sample comes
-            lambda: tick(next(earlier)) or client.statuses, "a status"
-        )
+        begun = clock.now = messages[0][1] - DAY - 60 * SECOND
+        # The node's time is that of /clock before the first sample comes.
+        clock.run_until(lambda: begun <= last_stamp(client), "a status of that time")
         for count, (connection, received, data) in enumerate(messages):
             if count % 100 == 0:
-                tick(received - DAY)
+                clock.show(received - DAY)
                 for publisher in topics.values():
                     assert publisher.wait_for_all_acked(Duration(seconds=60.0))
             topics[connection.topic.rpartition("/")[2]].publish(bytes(data))
-    client.node.create_timer(0.05, lambda: tick(shown[-1] + SECOND // 20))
+    client.node.create_timer(0.05, lambda: clock.show(clock.now + SECOND // 20))
     client.identified_whole(held(quick_record()))
     assert told_by(client) == run.numbers
-    stamp = client.statuses[-1][0]
-    assert shown[0] <= stamp.sec * SECOND + stamp.nanosec <= shown[-1]
+    assert begun <= last_stamp(client) <= clock.now
 
 
 def test_a_saved_buffer_gives_the_numbers_of_the_node(run):
@@ -177,45 +159,25 @@ def test_a_saved_buffer_gives_the_numbers_of_the_node(run):
     saved = Path(response.message)
     assert saved.parent == run.folder / "saved"
     assert re.fullmatch(r"fv_101_\d{8}T\d{6}Z", saved.name)
+    with Reader(saved) as bag:
+        assert set(bag.topics) == {f"{NAMESPACE}/actuator_pressure", f"{NAMESPACE}/stem_state"}
     for options in (("--valve", saved / "valve.yaml"), ()):  # its own is found
         assert numbers_of(identified(saved, *options)) == run.numbers
 
 
 def test_a_saved_buffer_knows_the_settings_of_the_node(run):
     changes = {"method": "bench", "fixed.mass": 1.6, "derivative_window": 21}
-    assert run.client.set_together(IDENTIFIER, changes).successful
+    assert run.client.set_together(NODE, changes).successful
     assert run.client.trigger("identify").success
     numbers = told_by(run.client)
     assert "nan" not in (numbers["threshold"], numbers["published coulomb_friction"])
     saved = Path(run.client.trigger("save").message)
     before = {"method": "plant", "fixed.mass": math.nan, "derivative_window": 0}
-    assert run.client.set_together(IDENTIFIER, before).successful
+    assert run.client.set_together(NODE, before).successful
     answer = identified(saved)
     assert answer["method"] == "bench"
     assert answer["parameters"]["mass"]["verdict"] == "fixed"
     assert numbers_of(answer) == numbers
-
-
-def test_topics_and_stamps_of_a_saved_buffer(run):
-    saved = Path(run.client.trigger("save").message)
-    heard = {data for topic, data in messages(run.recorded)}
-    last = {data for topic, data in messages(saved)}
-    assert {topic for topic, _ in messages(saved)} == {
-        f"{NAMESPACE}/actuator_pressure",
-        f"{NAMESPACE}/stem_state",
-    }
-    assert last < heard
-
-
-def messages(bag):
-    """Topic, and stamp and value of each message; padding between the fields is not compared."""
-    with Reader(bag) as reader:
-        for connection, _, data in reader.messages():
-            message = bags.TYPES.deserialize_cdr(data, connection.msgtype)
-            stamp = message.header.stamp
-            value = getattr(message, "fluid_pressure", None)
-            value = message.position[0] if value is None else value
-            yield connection.topic, (connection.topic, stamp.sec, stamp.nanosec, value)
 
 
 def start_saving_into(live, folder, **parameters):
@@ -242,7 +204,7 @@ def test_what_cannot_be_written_is_told_and_the_node_goes_on(live, tmp_path):
 def test_the_node_goes_on_while_it_saves(live, tmp_path):
     folder = tmp_path / SLOW
     start_saving_into(live, folder)
-    saving = live.client.request(Trigger, f"{IDENTIFIER}/save", Trigger.Request())
+    saving = live.client.request(Trigger, f"{NODE}/save", Trigger.Request())
     live.client.next_status()
     assert live.client.trigger("set_baseline").success
     assert not saving.done()

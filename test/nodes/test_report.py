@@ -15,15 +15,13 @@ from pathlib import Path
 
 import pytest
 from histories import DAY, success
-from live_nodes import NAMESPACE
+from live_nodes import NODE
 from pages import PageReader
 from records import quick_record
 
 from valve_friction_ros.health import Baseline
 from valve_friction_ros.history import HistoryFile, KeptBaseline, KeptValve
 from valve_friction_ros.model import HIGH_FRICTION
-
-IDENTIFIER = f"{NAMESPACE}/identifier"
 
 
 def report(client):
@@ -58,7 +56,7 @@ def test_the_last_estimate_is_drawn_from_its_own_record(bench):
     assert page.said("h1") == ["Friction of fv_101"]
     assert page.table("friction")["diagnosis"] == (message,)
     assert page.table("record")["samples"][0].startswith(f"{len(low)}, ")
-    assert page.table("record")["source"][0].startswith(f"node {IDENTIFIER}, identified ")
+    assert page.table("record")["source"][0].startswith(f"node {NODE}, identified ")
 
     # The buffer moves on, and a record that cannot be identified changes only the notes.
     client.empty_the_buffer()
@@ -82,8 +80,7 @@ def test_the_last_estimate_is_drawn_from_its_own_record(bench):
 
 def test_friction_is_judged_against_the_baseline_in_force(bench):
     client, _ = bench
-    client.identified(quick_record())
-    assert client.trigger("set_baseline").success
+    client.set_baseline(quick_record())
     message = client.identified(quick_record(HIGH_FRICTION))
     _, page = report(client)
     assert page.status[:3] == ("red", "✗", "Excess friction")
@@ -97,7 +94,7 @@ def test_friction_is_judged_against_the_baseline_in_force(bench):
 def test_the_trend_and_the_signature_of_the_baseline_are_those_of_the_history(live, tmp_path):
     """Also after a restart: identifications of five days before, and the record of a baseline."""
     kept = HistoryFile(tmp_path / "history.sqlite")
-    valve = KeptValve(IDENTIFIER, "FV-101")
+    valve = KeptValve(NODE, "FV-101")
     healthy, now = Baseline(150.0, 2.0), time.time_ns()
     record = KeptBaseline.thin(quick_record())
     kept.set_baseline(valve, KeptBaseline(healthy, now - 40 * DAY, now - 40 * DAY, record))
@@ -105,8 +102,7 @@ def test_the_trend_and_the_signature_of_the_baseline_are_those_of_the_history(li
         friction = 150.0 + 2.0 * (35 - days)
         kept.add(success(now - days * DAY, friction, 2.0, valve=valve, method="plant"))
     places = {"report_folder": str(tmp_path), "history_file": str(kept.path)}
-    live.start_identifier({**places})
-    client = live.client
+    client = live.client_of_identifier({**places})
     client.identified(quick_record(HIGH_FRICTION))
     _, page = report(client)
     assert page.said("h2")[2:4] == ["Friction compared with its baseline", "Trend"]
@@ -116,7 +112,7 @@ def test_the_trend_and_the_signature_of_the_baseline_are_those_of_the_history(li
     assert any("; identified 20" in text for text in page.said("p"))
 
     # Another baseline than that of the history has no record, and a lost history no trend.
-    (done,) = client.set_parameters(IDENTIFIER, {"baseline_coulomb_friction": 140.0})
+    (done,) = client.set_parameters(NODE, {"baseline_coulomb_friction": 140.0})
     assert done.successful
     kept.path.write_bytes(b"no database" * 100)
     _, page = report(client)

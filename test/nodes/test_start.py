@@ -17,12 +17,11 @@ import sys
 
 import pytest
 import yaml
-from live_nodes import NAMESPACE, PROJECT, Domain, NodeProcess, values_of
+from live_nodes import NAMESPACE, NODE, PROJECT, Domain, NodeProcess, values_of
 from local_server import free_port
 
 from valve_friction_ros.records.files import data_folder
 
-NODE = f"{NAMESPACE}/identifier"
 PLAYED = str(PROJECT / "test/nodes/played_pressure.csv")
 OF_A_FILE = {"excitation": "file", "file": PLAYED}
 REFUSED = {  # node, parameters, words of the only line
@@ -354,7 +353,7 @@ import sys
 import numpy as np
 from valve_friction_ros.history.trend import fit_line
 import valve_friction_ros.dashboard.charts
-import valve_friction_ros.nodes.dashboard.node
+import valve_friction_ros.nodes.dashboard
 
 days = np.arange(9.0)
 fit_line(days, 1.0 + 0.1 * days + 0.01 * np.cos(9 * days), np.full(9, 0.001)).half_width(3.0)

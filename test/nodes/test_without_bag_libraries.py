@@ -11,14 +11,11 @@
 
 import os
 import re
-import subprocess
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
+from live_nodes import PROJECT, command
 
-PROJECT = Path(__file__).resolve().parents[2]
 LIBRARIES = ("apsw", "backports", "lz4", "rosbags")
 LINE = re.compile(
     r"bags need rosbags, lz4 and backports.zstd \(No module named '\w+'\): "
@@ -36,11 +33,6 @@ def without_libraries(monkeypatch, tmp_path):
         (folder / f"{name}.py").write_text(text)
     path = [str(folder), str(PROJECT), os.environ.get("PYTHONPATH")]
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join(filter(None, path)))
-
-
-def identify(*arguments):
-    command = [sys.executable, "-m", "valve_friction_ros", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
 
 
 @pytest.mark.parametrize(
@@ -66,11 +58,11 @@ def test_csv_is_identified_and_a_bag_is_refused(loose_record, bench_yaml, tmp_pa
     file = tmp_path / "record.csv"
     np.savetxt(file, columns, "%.12g", ",", header="time_s,pressure_pa,position_m", comments="")
     options = ("--valve", bench_yaml, "--method", "published")
-    done = identify("identify", file, *options)
+    done = command("identify", file, *options)
     assert done.returncode == 0, done.stderr
     bag = tmp_path / "bag.mcap"
     bag.write_bytes(b"\x89MCAP0\r\n")
-    done = identify("identify", bag, *options)
+    done = command("identify", bag, *options)
     assert done.returncode == 2
     assert LINE.fullmatch(done.stderr.strip().removeprefix("valve_friction identify: "))
 
@@ -80,6 +72,6 @@ def test_a_folder_tells_which_are_bags(bench_yaml, tmp_path):
     folder.mkdir()
     (folder / "bag.mcap").write_bytes(b"\x89MCAP0\r\n")
     output = tmp_path / "rows.csv"
-    done = identify("identify-folder", folder, "--valve", bench_yaml, "--output", output)
+    done = command("identify-folder", folder, "--valve", bench_yaml, "--output", output)
     assert done.returncode == 2, done.stderr
     assert LINE.search(output.read_text())

@@ -19,24 +19,19 @@ import time
 from pathlib import Path
 
 import pytest
-from records import quick_record
 from waiting import PATIENCE, wait_until
 
 from valve_friction_ros.health import (
-    FrictionMonitor,
-    MonitorSettings,
     RefusedRecordError,
-    identify_snapshot,
 )
 from valve_friction_ros.health.measured import Measured
 from valve_friction_ros.identification import RefusalError
-from valve_friction_ros.model import BENCH_VALVE, compiled
+from valve_friction_ros.model import compiled
 from valve_friction_ros.nodes.identifier import workers as workers_module
 from valve_friction_ros.nodes.identifier.workers import running_workers
 from valve_friction_ros.nodes.plumbing import processes as module
 from valve_friction_ros.nodes.plumbing.processes import ElsewhereError, Processes
-from valve_friction_ros.nodes.plumbing.worker import Worker
-from valve_friction_ros.streams import rows_arrived
+from valve_friction_ros.nodes.plumbing.worker import Worker, workers_have_ended
 
 NUMBERS = {"position_noise": Measured(1e-6, 1e-7)}
 
@@ -138,15 +133,6 @@ def is_running(process):
     return state != "Z"
 
 
-def test_a_result_is_that_of_a_thread(processes):
-    record = quick_record()
-    monitor = FrictionMonitor(MonitorSettings(BENCH_VALVE))
-    columns = zip(record.time, record.pressure, record.position, strict=True)
-    monitor.buffer.add_arrivals(rows_arrived([*columns]))
-    result = processes.done(identify_snapshot, *monitor.input())
-    assert result.to_dict() == identify_snapshot(*monitor.input()).to_dict()
-
-
 def test_what_work_raises_comes_whole(processes):
     with pytest.raises(RefusedRecordError, match="the stem did not move") as raised:
         processes.done(refuse)
@@ -185,37 +171,21 @@ def test_what_is_compiled_without_a_place_is_known_here(monkeypatch):
         assert not compiled.kernels_are_cached()
 
 
-def test_threads_share_what_waits(tmp_path):
-    worker = Worker("test", threads=2)
+def test_threads_share_what_waits_and_tell_how_long_they_are_busy(worker, tmp_path):
+    assert (worker.busy_for(), worker.is_busy) == (0.0, False)
     blocked = worker.submit(wait_for, tmp_path / "end")
     assert done(worker.submit(os.getpid)) == os.getpid()
-    assert worker.busy_for() > 0.0
+    wait_until(lambda: worker.busy_for() > 0.05)
+    assert worker.is_busy
     (tmp_path / "end").touch()
     done(blocked)
-    worker.shutdown()
-    assert not worker.is_busy
+    wait_until(lambda: not worker.is_busy)
+    assert worker.busy_for() == 0.0
 
 
-def test_valves_take_turns():
-    """Each has one identification in the queue: one that asks again is behind the others."""
-    begin, order, done = threading.Event(), [], threading.Event()
-    worker = Worker("identify")
-
-    def identify(valve):
-        begin.wait(PATIENCE)
-        order.append(valve)
-
-    def ask_again(future):
-        future.result()
-        if len(order) < 6:
-            worker.submit(identify, "storm").add_done_callback(ask_again)
-        else:
-            done.set()
-
-    worker.submit(identify, "storm").add_done_callback(ask_again)
-    for valve in ("b", "c"):
-        worker.submit(identify, valve)
-    begin.set()
-    assert done.wait(PATIENCE)
-    worker.shutdown()
-    assert order == ["storm", "b", "c", "storm", "storm", "storm"]
+@pytest.mark.parametrize("finishes", [True, False])
+def test_the_end_waits_for_what_finishes(finishes):
+    with Worker("test", finishes=finishes) as worker:
+        worker.submit(time.sleep, 0.3)
+        assert workers_have_ended(PATIENCE) == finishes
+    assert workers_have_ended(0.0)

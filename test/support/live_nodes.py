@@ -31,6 +31,7 @@ from rcl_interfaces.srv import (
 from rclpy.duration import Duration
 from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import FluidPressure, JointState
 from std_msgs.msg import Float64, Float64MultiArray
 from std_srvs.srv import Trigger
@@ -40,6 +41,9 @@ from benchmark.harness.run import Participant
 
 PROJECT = Path(__file__).resolve().parents[2]
 NAMESPACE = "/fv_101"
+NODE = f"{NAMESPACE}/identifier"
+OK, WARN, ERROR = b"\x00", b"\x01", b"\x02"
+"""Levels of a diagnostic."""
 _REPEAT = 5.0
 """Time until a service is called again, s."""
 SECOND = 1_000_000_000
@@ -221,7 +225,7 @@ class Client(Participant):
 
     # The identifier's services
 
-    def trigger(self, service, node=f"{NAMESPACE}/identifier"):
+    def trigger(self, service, node=NODE):
         return self.call(Trigger, f"{node}/{service}", Trigger.Request())
 
     def identify_all(self, count):
@@ -268,6 +272,16 @@ class Client(Participant):
         assert self.trigger("clear").success
         self.send_record(record, start)
         return self.identified_whole(2 * len(record))
+
+    def set_baseline(self, record):
+        """Identify a record, and set its friction as the baseline."""
+        self.identified(record)
+        assert self.trigger("set_baseline").success
+
+    def fill(self, record):
+        """Publish a record, and wait until all of it is in the empty buffer."""
+        self.send_record(record)
+        self.wait_for_buffered(2 * len(record))
 
     # Diagnostics
 
@@ -318,22 +332,22 @@ class Client(Participant):
 
     def friction(self, *names):
         """Return the latched results of these names."""
-        topic = f"{NAMESPACE}/identifier/friction/"
+        topic = f"{NODE}/friction/"
         return {name: self.latched(Float64, topic + name).data for name in names}
 
     def half_widths(self, *names):
         """Return the latched half widths of the intervals of these parameters."""
-        topic = f"{NAMESPACE}/identifier/half_width/"
+        topic = f"{NODE}/half_width/"
         return {name: self.latched(Float64, topic + name).data for name in names}
 
     def published(self, *names):
         """Return the latched results of the published method."""
-        topic = f"{NAMESPACE}/identifier/published/"
+        topic = f"{NODE}/published/"
         return {name: self.latched(Float64, topic + name).data for name in names}
 
     def sweep(self):
         """Return the latched sweep as a table and the labels of its columns."""
-        message = self.latched(Float64MultiArray, f"{NAMESPACE}/identifier/sweep")
+        message = self.latched(Float64MultiArray, f"{NODE}/sweep")
         rows, columns = message.layout.dim
         table = np.array(message.data).reshape(rows.size, columns.size)
         return message.layout, dict(zip(columns.label.split(","), table.T, strict=True))
@@ -427,6 +441,39 @@ class Client(Participant):
         request = SetParametersAtomically.Request(parameters=_parameter_messages(values))
         name = f"{node}/set_parameters_atomically"
         return self.call(SetParametersAtomically, name, request).result
+
+
+def command(*arguments):
+    """Run the command as a person would; how it ended, and what it said."""
+    return subprocess.run(
+        [sys.executable, "-m", "valve_friction_ros", *map(str, arguments)],
+        cwd=PROJECT,
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
+
+
+class SimulatedClock:
+    """The time on /clock; `now` is the last that it has shown, ns."""
+
+    def __init__(self, client):
+        self._client, self.now = client, 0
+        self.publisher = client.node.create_publisher(Clock, "/clock", STREAM)
+
+    def show(self, now):
+        self.now = now
+        self.publisher.publish(Clock(clock=time_of(now)))
+
+    def run_until(self, condition, what, step=SECOND // 20):
+        """Let the time run until `condition()` is true; with no step it stands still."""
+
+        def met():
+            self.show(self.now + step)
+            return condition()
+
+        return self._client.wait_until(met, what)
 
 
 def _parameter_messages(values):

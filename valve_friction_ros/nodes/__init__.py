@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING
 from valve_friction_ros.on_demand import names_on_demand
 
 if TYPE_CHECKING:
-    from valve_friction_ros.nodes.dashboard.node import Dashboard as Dashboard
+    from valve_friction_ros.nodes.dashboard import Dashboard as Dashboard
     from valve_friction_ros.nodes.identifier.node import Identifier as Identifier
     from valve_friction_ros.nodes.pressure_source import PressureSource as PressureSource
     from valve_friction_ros.nodes.simulator import Simulator as Simulator

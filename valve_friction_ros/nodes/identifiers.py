@@ -13,6 +13,7 @@ import contextlib
 import os
 import sys
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
@@ -104,7 +105,7 @@ def _identifiers_of_valves(
     places = _places(host.get_parameter("valves").value)
     processes = host.get_parameter("identification_processes").value
     workers = opened.enter_context(running_workers(processes))
-    declare_parameters(host, (services,), parameter_services=len(places) <= _FEW)
+    declare_parameters(host, [replace(services, initial=len(places) <= _FEW)])
     context, faults = host.context, dict[str, str]()
     for number, place in enumerate(places):
         if number and number % _TOGETHER == 0:

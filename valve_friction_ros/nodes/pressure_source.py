@@ -33,7 +33,7 @@ from valve_friction_ros.nodes.plumbing.messages import time_message
 from valve_friction_ros.nodes.plumbing.parameters import declare_parameters, values_of
 from valve_friction_ros.nodes.plumbing.polled_node import PacedNode
 from valve_friction_ros.nodes.plumbing.qos import qos_overrides, stream
-from valve_friction_ros.nodes.plumbing.running import run_node
+from valve_friction_ros.nodes.plumbing.running import run_nodes
 from valve_friction_ros.records.table import read_columns
 from valve_friction_ros.settings import NODES
 
@@ -58,10 +58,12 @@ def pressure_from_file(path: Path, values: Mapping[str, Any]) -> SampledPressure
     columns = read_columns(path, ("time_s", "pressure_pa"))
     signal = SampledPressure(columns["time_s"], columns["pressure_pa"])
     lowest, highest = float(signal.pressures.min()), float(signal.pressures.max())
+    rates = np.abs(np.diff(signal.pressures) / np.diff(signal.times))
+    rate = float(np.max(rates, initial=0.0))
     for name, breaks, found, unit in (
         ("file_minimum", lowest < values["file_minimum"], lowest, "Pa"),
         ("file_maximum", highest > values["file_maximum"], highest, "Pa"),
-        ("file_rate", (rate := _largest_rate(signal)) > values["file_rate"], rate, "Pa/s"),
+        ("file_rate", rate > values["file_rate"], rate, "Pa/s"),
     ):
         if breaks:
             raise ValueError(
@@ -69,11 +71,6 @@ def pressure_from_file(path: Path, values: Mapping[str, Any]) -> SampledPressure
                 "is played; plan the test again, or change the limit"
             )
     return signal
-
-
-def _largest_rate(signal: SampledPressure) -> float:
-    rates = np.abs(np.diff(signal.pressures) / np.diff(signal.times))
-    return float(np.max(rates, initial=0.0))
 
 
 def _excitation(values: Mapping[str, Any]) -> Excitation:
@@ -190,7 +187,7 @@ class PressureSource(PacedNode):
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the node."""
-    return run_node(PressureSource, arguments)
+    return run_nodes(lambda: [PressureSource()], arguments)
 
 
 if __name__ == "__main__":

@@ -25,7 +25,7 @@ from typing import Any, NamedTuple
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.srv import GetParameters, SetParametersAtomically
-from rclpy.executors import SingleThreadedExecutor
+from rclpy.executors import Executor, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
@@ -239,17 +239,10 @@ class ServiceAnswer(NamedTuple):
 class Caller:
     """A client of identifiers; it waits for answers while `is_wanted()` is true."""
 
-    def __init__(self, node: Node, is_wanted: Callable[[], bool]) -> None:
-        self._node = node
-        self._is_wanted = is_wanted
-        self._executor = SingleThreadedExecutor()
-        self._executor.add_node(node)
+    def __init__(self, node: Node, executor: Executor, is_wanted: Callable[[], bool]) -> None:
+        self._node, self._executor, self._is_wanted = node, executor, is_wanted
         self._levels: dict[str, Level] = {}
         self._hears_levels = False
-
-    def close(self) -> None:
-        """Shut down the executor."""
-        self._executor.shutdown()
 
     def _wait(self, done: Callable[[], object], patience: float) -> bool:
         """Spin until `done()` is true; return whether it became true in time."""
@@ -360,11 +353,12 @@ def caller(is_wanted: Callable[[], bool]) -> Iterator[Caller]:
             enable_rosout=False,
             start_parameter_services=False,
         )
-        one = Caller(node, is_wanted)
+        executor = SingleThreadedExecutor()
+        executor.add_node(node)
         try:
-            yield one
+            yield Caller(node, executor, is_wanted)
         finally:
-            one.close()
+            executor.shutdown()
             node.destroy_node()
     finally:
         rclpy.try_shutdown()

@@ -38,7 +38,7 @@ from valve_friction_ros.nodes.plumbing.parameters import (
 from valve_friction_ros.nodes.plumbing.polled_node import PacedNode
 from valve_friction_ros.nodes.plumbing.polled_subscription import PolledSubscription
 from valve_friction_ros.nodes.plumbing.qos import qos_overrides, stream
-from valve_friction_ros.nodes.plumbing.running import run_node
+from valve_friction_ros.nodes.plumbing.running import run_nodes
 from valve_friction_ros.nodes.plumbing.worker import Readiness, Worker
 from valve_friction_ros.settings import NODES
 
@@ -150,7 +150,7 @@ class Simulator(PacedNode):
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the node."""
-    return run_node(Simulator, arguments)
+    return run_nodes(lambda: [Simulator()], arguments)
 
 
 if __name__ == "__main__":

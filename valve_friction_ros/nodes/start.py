@@ -61,7 +61,7 @@ def _help_text(name: str, purpose: str) -> str:
     return "\n".join(lines)
 
 
-dashboard = partial(_start, "dashboard.node")
+dashboard = partial(_start, "dashboard")
 identifier = partial(_start, "identifier.node")
 identifiers = partial(_start, "identifiers")
 simulator = partial(_start, "simulator")

@@ -25,10 +25,10 @@ from sensor_msgs.msg import FluidPressure, JointState
 from std_msgs.msg import String
 
 from valve_friction_ros.nodes.plumbing.parameters import declare_parameters, values_of
-from valve_friction_ros.nodes.plumbing.polled_node import PacedNode, create_trigger_service
+from valve_friction_ros.nodes.plumbing.polled_node import PacedNode, create_service
 from valve_friction_ros.nodes.plumbing.polled_subscription import PolledSubscription
 from valve_friction_ros.nodes.plumbing.qos import LATCHED, stream
-from valve_friction_ros.nodes.plumbing.running import run_node
+from valve_friction_ros.nodes.plumbing.running import run_nodes
 from valve_friction_ros.nodes.pressure_source import pressure_from_file
 from valve_friction_ros.planning.played_test import Abort, PlayedTest, PlayLimits, PlayPhase
 from valve_friction_ros.settings import NODES
@@ -74,8 +74,8 @@ class StrokePlayer(PacedNode):
         self._state = self.create_publisher(String, "~/state", LATCHED)
         self._pressures = PolledSubscription(self, FluidPressure, "actuator_pressure", stream())
         self._stems = PolledSubscription(self, JointState, "stem_state", stream())
-        create_trigger_service(self, "~/start", self._start, "not started")
-        create_trigger_service(self, "~/stop", self._stop)
+        create_service(self, "~/start", self._start, "not started")
+        create_service(self, "~/stop", self._stop)
 
     def close(self) -> None:
         """Return to the start of a running test, and wait for the delivery of this set point."""
@@ -146,7 +146,7 @@ class StrokePlayer(PacedNode):
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the node."""
-    return run_node(StrokePlayer, arguments)
+    return run_nodes(lambda: [StrokePlayer()], arguments)
 
 
 if __name__ == "__main__":

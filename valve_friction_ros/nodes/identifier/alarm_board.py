@@ -11,7 +11,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rclpy.parameter import Parameter
 from std_srvs.srv import SetBool
@@ -38,11 +38,7 @@ from valve_friction_ros.history.status_values import alarm_values
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.nodes.identifier.evidence_watch import EvidenceWatch
 from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
-from valve_friction_ros.nodes.plumbing.polled_node import (
-    PolledNode,
-    create_service,
-    create_trigger_service,
-)
+from valve_friction_ros.nodes.plumbing.polled_node import PolledNode, create_service
 from valve_friction_ros.settings import NODES
 
 if TYPE_CHECKING:
@@ -80,6 +76,8 @@ class AlarmBoard:
 
     Attributes
     ----------
+    alarms : dict of AlarmKind to Alarm
+        The alarms by kind, without those never raised.
     is_requested : bool
         Whether somebody asked for the next identification: its 95 % interval then decides.
     """
@@ -93,7 +91,7 @@ class AlarmBoard:
     ) -> None:
         self._node, self._monitor, self._history = node, monitor, history
         self._evidence = evidence
-        self._alarms: dict[AlarmKind, Alarm] = history.alarms()
+        self.alarms: dict[AlarmKind, Alarm] = history.look_up(database.read_alarms) or {}
         moves = evidence.evidence
         self._hold = FrictionHold(
             {side: self._condition(kind) for side, kind in ALARM_OF_SIDE.items()},
@@ -115,16 +113,11 @@ class AlarmBoard:
             ("unshelve", AlarmAction.UNSHELVE),
             ("comment", AlarmAction.COMMENT),
         ):
-            create_trigger_service(node, f"~/{name}", partial(self._ask, action))
-        create_service(node, SetBool, "~/out_of_service", self._switch)
-
-    @property
-    def alarms(self) -> Mapping[AlarmKind, Alarm]:
-        """The alarms by kind, without those never raised."""
-        return self._alarms
+            create_service(node, f"~/{name}", partial(self._ask, action))
+        create_service(node, "~/out_of_service", self._switch, kind=SetBool)
 
     def _condition(self, kind: AlarmKind) -> Condition:
-        return self._alarms[kind].condition if kind in self._alarms else NO_CONDITION
+        return self.alarms[kind].condition if kind in self.alarms else NO_CONDITION
 
     # Conditions of the valve
 
@@ -156,7 +149,7 @@ class AlarmBoard:
         for kind, condition in shown.items():
             delay = self._delays[kind] = self._delays[kind].seen(condition, now)
             conditions[kind] = delay.shown
-        if events := all_followed(self._alarms, conditions, time):
+        if events := all_followed(self.alarms, conditions, time):
             self._take(events)
             valve, days = self._history.valve, self._days
             self._under_way = _Step(
@@ -169,7 +162,7 @@ class AlarmBoard:
         return float(self._node.get_parameter("history_days").value)
 
     def _take(self, events: Sequence[AlarmEvent]) -> None:
-        self._alarms |= {one.alarm.kind: one.alarm for one in events}
+        self.alarms |= {one.alarm.kind: one.alarm for one in events}
         for one in events:
             by = f" by {one.who}" if one.who else ""
             said = one.text or (one.alarm.message if one.alarm.is_active else "")
@@ -182,10 +175,10 @@ class AlarmBoard:
         """Adopt the alarms of the history once our change is written: others write there too."""
         step = self._under_way
         if step is not None and step.made is not None:
-            self._alarms = dict(step.made.alarms)
+            self.alarms = dict(step.made.alarms)
             self._under_way = None
         if self._under_way is None:
-            self._alarms |= self._history.alarm_news()
+            self.alarms |= self._history.alarm_news()
 
     def _frictions(self, renewal: int) -> dict[AlarmKind, Condition]:
         """Update the friction conditions after a new identification or new moves."""
@@ -219,8 +212,8 @@ class AlarmBoard:
 
     # Requests by people
 
-    async def _switch(self, request: Any) -> str:
-        return await self._ask(AlarmAction.TAKE_OUT if request.data else AlarmAction.PUT_BACK)
+    async def _switch(self, is_out: bool) -> str:
+        return await self._ask(AlarmAction.TAKE_OUT if is_out else AlarmAction.PUT_BACK)
 
     async def _ask(self, action: AlarmAction) -> str:
         """Carry out the request in the parameters, which apply to one request."""
@@ -243,14 +236,13 @@ class AlarmBoard:
         time = self._node.get_clock().now().nanoseconds
         valve, days = self._history.valve, self._days
         step = _Step(lambda file: database.request_alarms(file, valve, kind, request, time, days))
-        if self._history.path is not None:
-            await self._history.keep_step(step)
+        await self._history.keep_change(step)
         if step.refusal is not None:
             raise step.refusal
         if step.made is None:  # not stored, or not yet
-            events = all_requested(self._alarms, kind, request, time)
+            events = all_requested(self.alarms, kind, request, time)
         else:
-            events, self._alarms = step.made.events, dict(step.made.alarms)
+            events, self.alarms = step.made.events, dict(step.made.alarms)
             self._under_way = None  # it was made earlier
         self._take(events)
         return "; ".join(str(one.alarm) for one in events) + self._history.reservation
@@ -259,4 +251,4 @@ class AlarmBoard:
 
     def values(self) -> dict[str, str]:
         """Return the state of each alarm, with details of those that are not normal."""
-        return alarm_values(self._alarms)
+        return alarm_values(self.alarms)

@@ -16,6 +16,7 @@ from collections.abc import Mapping, Sequence
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from rclpy.node import Node
 
+from valve_friction_ros import history as database
 from valve_friction_ros.alerts import URL_VARIABLE, Alert, Outbox, Secrets, Webhook
 from valve_friction_ros.health import (
     Alarm,
@@ -132,7 +133,7 @@ class Alerts:
                 f"no token is sent to {webhook}, because the token in the environment goes only "
                 f"to the address in {URL_VARIABLE}: set the address there instead of webhook_url"
             )
-        self._kept = history.told_level()
+        self._kept = history.look_up(database.read_told_level)
         self._told = level if self._kept is None else self._kept
         self._told_at = -math.inf if self._kept is None else time.monotonic()
 

@@ -38,7 +38,6 @@ from valve_friction_ros.health import (
     FrictionMonitor,
     Level,
     MonitorSettings,
-    Reference,
     baseline_by_evidence,
     diagnosis_by_evidence,
     qualified,
@@ -91,12 +90,13 @@ class MoveLedger:
 
     def __init__(self, node: Node, history: HistoryWriter, built: Valve) -> None:
         self._node, self._history, self._built = node, history, built
-        self._moves: deque[Move] = deque(history.moves()[-MOST_MOVES:], maxlen=MOST_MOVES)
+        moves = history.look_up(database.read_moves, built) or ()
+        self._moves = deque(moves, maxlen=MOST_MOVES)
         self._unwritten: deque[Move] = deque(maxlen=MOST_MOVES)
         self._batch: _Batch | None = None
         self._written_at = time.monotonic()
-        self.reference: Reference | None = history.reference()
-        self.change: FrictionChange | None = history.change()
+        self.reference = history.look_up(database.read_reference, built)
+        self.change = history.look_up(database.read_change, built)
         self.left_out = 0
         self._left_in_a_row = 0
         self._problem = ""
@@ -244,6 +244,11 @@ class EvidenceWatch:
 
     A thread combines the moves. At the start they are combined immediately, so that no earlier
     alarm ends.
+
+    Attributes
+    ----------
+    evidence : Evidence
+        The evidence of all moves, from the latest combination.
     """
 
     def __init__(
@@ -262,17 +267,12 @@ class EvidenceWatch:
         self._use(evidence_of(self._ledger.moves, *_combined_by(self._settings)))
 
     @property
-    def evidence(self) -> Evidence:
-        """The evidence of all moves, from the latest combination."""
-        return self._evidence
-
-    @property
     def diagnosis(self) -> Diagnosis | None:
         """The diagnosis from the moves; None if there is nothing to compare."""
         settings, reference = self._monitor.settings, self._ledger.reference
         valve, factor = settings.valve, self._monitor.common_factor
         found = diagnosis_by_evidence(
-            self._evidence, valve, self._monitor.baseline, settings.limits, reference
+            self.evidence, valve, self._monitor.baseline, settings.limits, reference
         )
         return None if found is None else qualified(found, factor, valve)
 
@@ -280,7 +280,7 @@ class EvidenceWatch:
     def source(self) -> str:
         """Source of the evidence, in words."""
         return (
-            f"from {self._evidence.moves} moves in service since {utc_second(self._evidence.since)}"
+            f"from {self.evidence.moves} moves in service since {utc_second(self.evidence.since)}"
         )
 
     @property
@@ -307,7 +307,7 @@ class EvidenceWatch:
             self._use(found)
         known = self._monitor.known.numbers
         numbers = {name: one for name, one in known.items() if name not in OF_ONE_RESULT}
-        return replace(baseline_by_evidence(self._evidence), numbers=numbers)
+        return replace(baseline_by_evidence(self.evidence), numbers=numbers)
 
     async def outdates(self, time: int) -> bool:
         """Return whether the moves since a time, ns, alone suffice for a baseline."""
@@ -352,7 +352,7 @@ class EvidenceWatch:
             return ()
         statement, leads = diagnosis.statement, self._leads(diagnosis)
         if not leads:
-            statement = said(Code.UNTIL_BEFORE, of=statement, time=self._evidence.until)
+            statement = said(Code.UNTIL_BEFORE, of=statement, time=self.evidence.until)
         ratio = math.nan if diagnosis.ratio is None else diagnosis.ratio.value
         return (
             Finding(
@@ -367,7 +367,7 @@ class EvidenceWatch:
     def _leads(self, diagnosis: Diagnosis) -> bool:
         """Return whether the moves are newer than the latest identification, or agree with it."""
         identified, now = self._monitor.seen_until, self._monitor.diagnosis().ratio
-        if identified is None or now is None or self._evidence.until > identified:
+        if identified is None or now is None or self.evidence.until > identified:
             return True
         ratio = diagnosis.ratio
         return ratio is None or (ratio.low <= now.high and now.low <= ratio.high)
@@ -376,7 +376,7 @@ class EvidenceWatch:
         """Return the numbers from the moves with their intervals, or why there are none."""
         self._settle()
         self._ledger.keep()
-        found = self._evidence
+        found = self.evidence
         values = {"evidence moves": str(found.moves)}
         if self._ledger.left_out:
             values["evidence left_out"] = str(self._ledger.left_out)
@@ -410,14 +410,14 @@ class EvidenceWatch:
     def _numbers(self) -> dict[str, str]:
         values = {}
         for name in _SHOWN:
-            one = self._evidence.parameters[name]
+            one = self.evidence.parameters[name]
             values[f"evidence {name} [{one.unit}]"] = number_text(one.value)
             values[f"evidence {name} half width [{one.unit}]"] = number_text(one.half_width)
             values[f"evidence {name} verdict"] = one.verdict.value
             if one.reason:
                 values[f"evidence {name} reason"] = one.reason
-        values["evidence sliding_speed [m/s]"] = number_text(self._evidence.sliding_speed)
-        band = self._evidence.parameters["dead_band"]
+        values["evidence sliding_speed [m/s]"] = number_text(self.evidence.sliding_speed)
+        band = self.evidence.parameters["dead_band"]
         travel = self._monitor.settings.valve.travel
         scale, unit = (100 / travel, "%") if math.isfinite(travel) else (1e3, "mm")
         values[f"evidence dead_band [{unit}]"] = number_text(scale * band.value)
@@ -454,7 +454,7 @@ class EvidenceWatch:
 
     def _use(self, evidence: Evidence) -> None:
         self._error = ""
-        self._evidence = evidence
+        self.evidence = evidence
         self._ledger.refer(evidence)
         self._ledger.note_change(evidence.change)
 

@@ -22,7 +22,6 @@ from typing import TYPE_CHECKING, TypeVar
 from rclpy.node import Node
 
 from valve_friction_ros import history as database
-from valve_friction_ros.evidence import FrictionChange, Move
 from valve_friction_ros.health import (
     Alarm,
     AlarmKind,
@@ -31,7 +30,6 @@ from valve_friction_ros.health import (
     IdentificationInput,
     KnownNumbers,
     Level,
-    Reference,
 )
 from valve_friction_ros.history import (
     AlarmRecording,
@@ -48,9 +46,7 @@ from valve_friction_ros.history.place import Claim
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.nodes.identifier.workers import HistoryThread
 from valve_friction_ros.nodes.plumbing.worker import InternalError, bugs_reported, done_in
-from valve_friction_ros.response import StepAnswer
 from valve_friction_ros.streams import utc_second
-from valve_friction_ros.usage import ValveUsage
 
 if TYPE_CHECKING:
     from valve_friction_ros.history import HistoryFile, Sender
@@ -112,111 +108,45 @@ class WaitingChanges:
             self._identifications = self._others = 0
 
 
-class _HistorySending:
-    """Sends the history to a server if one is named, else does nothing.
-
-    Raises ValueError if the address of the server is invalid, or there is no file.
-    """
-
-    def __init__(self, node: Node, path: Path | None, valve: KeptValve) -> None:
-        self._node, self._valve = node, valve
-        self._untaken: str | None = None
-        self._sender: Sender | None = None
-        server = server_from(node.get_parameter("history_url").value, "history_url")
-        if server is None:
-            return
-        if path is None:
-            raise ValueError(
-                "history_url requires history_file, which holds the rows waiting for the server"
-            )
-        self._sender = database.sender_of(path, server)
-
-    def take(self) -> None:
-        """Fetch rows of the valve that another machine has stored; may take some seconds."""
-        if self._sender is not None:
-            self._untaken = self._sender.take(self._valve)
-        if self._untaken is not None:
-            self._node.get_logger().warning(
-                "data that another machine may have stored for this valve was not read from the "
-                f"server; the next start tries again: {self._untaken}"
-            )
-
-    def follow(self) -> None:
-        news = None if self._sender is None else self._sender.news()
-        if news is not None:
-            self._node.get_logger().warning(news)
-
-    def values(self) -> dict[str, str]:
-        if self._sender is None:
-            return {}
-        state = self._sender.state
-        values = {
-            "history_server": str(self._sender.server),
-            "history_server waiting": str(state.count.waiting),
-            "history_server problem": state.problem or "",
-        }
-        if state.count.waiting and state.count.since is not None:
-            values["history_server waiting since [time]"] = utc_second(state.count.since * 10**9)
-        if state.count.refused:
-            values["history_server refused"] = str(state.count.refused)
-        if self._untaken is not None:
-            values["history_server not taken"] = self._untaken
-        return values
-
-    def close(self) -> None:
-        if self._sender is not None:
-            self._sender.end()
-            self._sender = None
-
-
 _HANDOVER = 10.0
 """Time, s, for which a node that is ending may still hold the history."""
-
-
-class _HistoryGuard:
-    """Watches the history file, and claims the rows of one valve in it."""
-
-    def __init__(self, path: Path, valve: str) -> None:
-        self._path, self._valve = path, valve
-        self.claim = Claim(path, valve)
-        self._refused_since = math.inf
-        self._known: tuple[int, int] | None = None
-
-    def ask(self) -> None:
-        is_granted = self.claim.ask()
-        self._refused_since = math.inf if is_granted else min(self._refused_since, time.monotonic())
-
-    @property
-    def conflict(self) -> str | None:
-        """That another node keeps the history of this valve, too, if so."""
-        if time.monotonic() - self._refused_since < _HANDOVER:
-            return None
-        return (
-            f"another node writes the history of {self._valve} to {self._path}: stop one of them, "
-            "or use another history_file or namespace"
-        )
-
-    @property
-    def is_another(self) -> bool:
-        """Whether the file has been replaced or removed since it was last noted."""
-        return self._known is not None and self._identity() != self._known
-
-    def note(self) -> None:
-        self._known = self._identity() or self._known
-
-    def _identity(self) -> tuple[int, int] | None:
-        try:
-            found = self._path.stat()
-        except OSError:
-            return None
-        return found.st_dev, found.st_ino
-
-
 _LONGEST = 60.0
 """Time, s, after which an unfinished write is a problem; a locked file fails sooner."""
 _END_OF_TIME = 2**63 - 1
 
 _T = TypeVar("_T")
+
+
+def _file_of(node: Node) -> "HistoryFile | None":
+    """Return the history file of the parameter; raises ValueError if its home is unknown."""
+    path = node.get_parameter("history_file").value
+    try:
+        return database.HistoryFile(Path(path).expanduser()) if path else None
+    except RuntimeError as error:  # of pathlib
+        raise ValueError(
+            f"history_file {path}: {error} Set HOME or ROS_HOME, or choose another file"
+        ) from None
+
+
+def _sender_of(node: Node, file: "HistoryFile | None") -> "Sender | None":
+    """Return what sends the history to a server, if one is named; raises ValueError."""
+    server = server_from(node.get_parameter("history_url").value, "history_url")
+    if server is None:
+        return None
+    if file is None:
+        raise ValueError(
+            "history_url requires history_file, which holds the rows waiting for the server"
+        )
+    return database.sender_of(file.path, server)
+
+
+def _identity_of(path: Path) -> tuple[int, int] | None:
+    """Return what a file that replaces this one does not share, or None without a file."""
+    try:
+        found = path.stat()
+    except OSError:
+        return None
+    return found.st_dev, found.st_ino
 
 
 class HistoryWriter:
@@ -241,17 +171,12 @@ class HistoryWriter:
         self._node = node
         self._monitor = monitor
         self.valve = KeptValve(node.get_fully_qualified_name(), tag)
-        path = node.get_parameter("history_file").value
-        try:
-            self._file = database.HistoryFile(Path(path).expanduser()) if path else None
-        except RuntimeError as error:  # of pathlib
-            raise ValueError(
-                f"history_file {path}: {error} Set HOME or ROS_HOME, or choose another file"
-            ) from None
-        self._guard = None
-        if self._file is not None:
-            self._guard = _HistoryGuard(self._file.path, self.valve.name)
-        self._sending = _HistorySending(node, self.path, self.valve)
+        self._file = _file_of(node)
+        self._claim = None if self._file is None else Claim(self._file.path, self.valve.name)
+        self._refused_since = math.inf
+        self._known: tuple[int, int] | None = None
+        self._sender = _sender_of(node, self._file)
+        self._untaken: str | None = None
         self._writer = writer
         self._waiting = WaitingChanges()
         self._problem: str | None = None
@@ -280,23 +205,44 @@ class HistoryWriter:
     @property
     def conflict(self) -> str | None:
         """That another node keeps the history of this valve, too, if so."""
-        return None if self._guard is None else self._guard.conflict
+        if time.monotonic() - self._refused_since < _HANDOVER:
+            return None
+        return (
+            f"another node writes the history of {self.valve.name} to {self.path}: stop one of "
+            "them, or use another history_file or namespace"
+        )
 
     def close(self) -> None:
-        """Release the history for another node."""
-        if self._guard is not None:
-            self._guard.claim.release()
-        self._sending.close()
+        """Release the history for another node, and stop sending it."""
+        if self._claim is not None:
+            self._claim.release()
+        if self._sender is not None:
+            self._sender.end()
+            self._sender = None
 
     def values(self) -> dict[str, str]:
         """Return the values of the diagnostics: nothing is stored, or the state of the sending."""
-        if self._file is not None:
-            return self._sending.values()
-        lost = (
-            "none, because history_file is empty: diagnosis and baseline are lost when this "
-            "node stops"
-        )
-        return {"history": lost}
+        if self._file is None:
+            lost = (
+                "none, because history_file is empty: diagnosis and baseline are lost when this "
+                "node stops"
+            )
+            return {"history": lost}
+        if self._sender is None:
+            return {}
+        state = self._sender.state
+        values = {
+            "history_server": str(self._sender.server),
+            "history_server waiting": str(state.count.waiting),
+            "history_server problem": state.problem or "",
+        }
+        if state.count.waiting and state.count.since is not None:
+            values["history_server waiting since [time]"] = utc_second(state.count.since * 10**9)
+        if state.count.refused:
+            values["history_server refused"] = str(state.count.refused)
+        if self._untaken is not None:
+            values["history_server not taken"] = self._untaken
+        return values
 
     @property
     def reservation(self) -> str:
@@ -318,35 +264,40 @@ class HistoryWriter:
 
         Rows of the valve that another machine has stored since are first fetched from the server.
         """
-        self._tried(lambda file, _: file.prepare())
-        if self._guard is not None:
-            self._guard.ask()
-            self._guard.note()
-        self._sending.take()
-        self.baseline = last = self._tried(lambda file, name: file.baseline(name))
+        self.look_up(lambda file, _: file.prepare())
+        self._ask()
+        self._note_file()
+        if self._sender is not None:
+            self._untaken = self._sender.take(self.valve)
+        if self._untaken is not None:
+            self._node.get_logger().warning(
+                "data that another machine may have stored for this valve was not read from the "
+                f"server; the next start tries again: {self._untaken}"
+            )
+        self.baseline = last = self.look_up(lambda file, name: file.baseline(name))
         if last is not None:
-            self._former = self._tried(lambda file, name: file.baseline(name, until=last.time))
-        return self._tried(lambda file, name: file.last_success(name))
+            self._former = self.look_up(lambda file, name: file.baseline(name, until=last.time))
+        return self.look_up(lambda file, name: file.last_success(name))
 
     def known_numbers(self, earlier: HistoryEntry) -> KnownNumbers | None:
         """Read the known numbers of the valve since its baseline, including the last success."""
         built, kept = self._monitor.settings.valve, self.baseline
         since = earlier.time if kept is None else min(kept.time, earlier.time)
-        return self._tried(lambda file, name: file.known_numbers(name, built, since))
+        return self.look_up(lambda file, name: file.known_numbers(name, built, since))
 
     def read_trend(self) -> None:
         """Compute the trend with the present baseline and settings."""
-        self.trend = self._tried(self._trend_job())
+        self.trend = self.look_up(self._trend_job())
 
-    def _tried(self, job: Callable[..., _T], *arguments: object) -> _T | None:
-        """Run a job with the file and the name of the valve, if there is a file.
+    def look_up(self, read: Callable[..., _T], *arguments: object) -> _T | None:
+        """Return what `read` finds on the valve, given the file and the name of the valve.
 
-        Only the first of several problems is reported.
+        None without a readable file. Only the first of several problems is reported.
         """
         if self._file is None:
             return None
         try:
-            return job(self._file, self.valve.name, *arguments)
+            return read(self._file, self.valve.name, *arguments)
         except HistoryError as error:
             if self._problem is None:
                 self._complain(error)
@@ -401,21 +352,9 @@ class HistoryWriter:
         self._former, self.baseline = self.baseline, None if kept.withdrawn else kept
         await self.keep_change(lambda file: file.set_baseline(self.valve, kept))
 
-    def usage(self) -> ValveUsage | None:
-        """Read the usage of the valve; None without a readable file."""
-        return self._tried(database.read_usage)
-
-    def told_level(self) -> Level | None:
-        """Read the level reported last, or None."""
-        return self._tried(database.read_told_level)
-
     def keep_told_level(self, level: Level) -> None:
         """Queue the level reported last for storage."""
         self.keep_soon(lambda file: database.keep_told_level(file, self.valve, level))
-
-    def alarms(self) -> dict[AlarmKind, Alarm]:
-        """Read the alarms of the valve; empty without a readable file."""
-        return self._tried(database.read_alarms) or {}
 
     def alarm_news(self) -> dict[AlarmKind, Alarm]:
         """Return the alarms of the valve changed in the file, also by another process."""
@@ -435,7 +374,7 @@ class HistoryWriter:
 
         Recordings with a future time, from before a clock was set back, are used only if all are.
         """
-        found = self._tried(database.alarm_recordings) or ()
+        found = self.look_up(database.alarm_recordings) or ()
         now = self._node.get_clock().now().nanoseconds
         past = [one for one in found if one.time <= now]
         return max(past or found, key=lambda one: one.time, default=None)
@@ -444,30 +383,6 @@ class HistoryWriter:
         """Make a change in the thread of the writer, and wait until it is written."""
         with self._failures_remembered():
             await self._written(change)
-
-    async def keep_step(self, change: _Change) -> None:
-        """Make a change like `keep_change`, but without updating the trend."""
-        if self._file is None:
-            return
-        self._waiting.add(change)
-        with self._failures_remembered():
-            await done_in(self._writer, self._write_waiting, self._file, time.monotonic())
-
-    def moves(self) -> tuple[Move, ...]:
-        """Read the moves of the valve in service; empty without a file."""
-        return self._tried(database.read_moves, self._monitor.settings.valve) or ()
-
-    def reference(self) -> Reference | None:
-        """Read the reference from the first moves of the valve; None without a file."""
-        return self._tried(database.read_reference, self._monitor.settings.valve)
-
-    def change(self) -> FrictionChange | None:
-        """Read the last change of friction found in the moves; None without a file."""
-        return self._tried(database.read_change, self._monitor.settings.valve)
-
-    def answers(self) -> tuple[StepAnswer, ...]:
-        """Read the responses of the stem to its command; empty without a file."""
-        return self._tried(database.read_answers, self._monitor.settings.valve.travel) or ()
 
     def keep_soon(self, change: _Change) -> None:
         """Queue a change for the thread of the writer; `settle` processes the outcome.
@@ -484,9 +399,9 @@ class HistoryWriter:
 
     def settle(self) -> None:
         """Process finished outcomes of `keep_soon`, and retry a claim that was refused."""
-        if self._guard is not None:
-            self._guard.ask()
-        self._sending.follow()
+        self._ask()
+        if self._sender is not None and (news := self._sender.news()) is not None:
+            self._node.get_logger().warning(news)
         while self._under_way and self._under_way[0].done():
             with self._failures_remembered():
                 self._under_way.pop(0).result()
@@ -526,15 +441,25 @@ class HistoryWriter:
         return trend(file, self.valve.name)
 
     def _write_waiting(self, file: "HistoryFile", asked: float) -> None:
-        if self._guard is None or self._waiting.first() is None:
+        if self._waiting.first() is None:
             return
         with self._writer.writing(file.path, asked):
-            if self._guard.is_another:
+            if self._known is not None and _identity_of(file.path) != self._known:
                 self._keep_again(file)
             while (change := self._waiting.first()) is not None:
                 change(file)
                 self._waiting.remove(change)
-        self._guard.note()
+        self._note_file()
+
+    def _ask(self) -> None:
+        """Claim the rows of the valve, and remember since when another node has them."""
+        if self._claim is not None:
+            is_granted, now = self._claim.ask(), time.monotonic()
+            self._refused_since = math.inf if is_granted else min(self._refused_since, now)
+
+    def _note_file(self) -> None:
+        if self.path is not None:
+            self._known = _identity_of(self.path) or self._known
 
     def _keep_again(self, file: "HistoryFile") -> None:
         """Store the baseline again if the file was removed, or replaced by one without it."""

@@ -38,12 +38,11 @@ from valve_friction_ros.health import (
 from valve_friction_ros.health.measured import DIFFERENCES
 from valve_friction_ros.identification import STATED, RefusalError, require_valve_units
 from valve_friction_ros.nodes.identifier.alarm_board import AlarmBoard
-from valve_friction_ros.nodes.identifier.alarm_recorder import AlarmRecorder
 from valve_friction_ros.nodes.identifier.alerts import Alerts, FaultLog, LevelLog, webhook_from
 from valve_friction_ros.nodes.identifier.baseline_in_force import BaselineInForce, baseline_from
 from valve_friction_ros.nodes.identifier.evidence_watch import EvidenceWatch
 from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
-from valve_friction_ros.nodes.identifier.requested_files import BagSaver, ReportWriter
+from valve_friction_ros.nodes.identifier.recordings import AlarmRecorder, BagSaver, ReportWriter
 from valve_friction_ros.nodes.identifier.response_watch import ResponseWatch, StandstillWatch
 from valve_friction_ros.nodes.identifier.status import (
     EstimateTopic,
@@ -69,8 +68,8 @@ from valve_friction_ros.nodes.plumbing.parameters import (
     valve_from,
     warn_of_columns,
 )
-from valve_friction_ros.nodes.plumbing.polled_node import create_trigger_service
-from valve_friction_ros.nodes.plumbing.running import run_node
+from valve_friction_ros.nodes.plumbing.polled_node import create_service
+from valve_friction_ros.nodes.plumbing.running import run_nodes
 from valve_friction_ros.nodes.plumbing.worker import InternalError, Readiness
 from valve_friction_ros.settings import (
     IDENTIFICATION,
@@ -276,7 +275,7 @@ class Identifier(ManagedNode):
             ("clear", self._clear, ""),
             ("reset_usage", partial(self._shown, self._reset_usage), ""),
         ):
-            create_trigger_service(self, f"~/{name}", work, failure)
+            create_service(self, f"~/{name}", work, failure)
         steady = Clock(clock_type=ClockType.STEADY_TIME)  # sim time may never start, or stop
         self.create_timer(_DIAGNOSTIC_PERIOD, self._tell, clock=steady)
         jumps = self.get_clock().create_jump_callback(
@@ -479,7 +478,7 @@ class Identifier(ManagedNode):
         """Publish the diagnostics, or a bug in them."""
         with self.guarded(_TELLING):
             self._publish_diagnostics()
-        if (bug := self.failure_of(_TELLING)) is None:
+        if (bug := self._failures.get(_TELLING)) is None:
             return
         status = self.stuck_status(bug)
         self._estimate_topic.publish(status)
@@ -558,7 +557,7 @@ class Identifier(ManagedNode):
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the node."""
     with running_workers(_PROCESSES) as workers:
-        return run_node(lambda: Identifier(workers), arguments)
+        return run_nodes(lambda: [Identifier(workers)], arguments)
 
 
 if __name__ == "__main__":

@@ -51,34 +51,6 @@ _PATIENCE = 60.0
 """Time, s, for which commands arrive but are all unusable, before this is a finding."""
 
 
-class _CommandTrouble:
-    """Remembers the problem of the latest commands, and since when none was usable."""
-
-    def __init__(self) -> None:
-        self.forget()
-
-    def forget(self) -> None:
-        self.problem = ""
-        self._first = self._last = math.nan
-
-    def take(self, problem: str, is_used: bool, now: float) -> None:
-        """Record the problem of the commands received at `now`, s, and whether any was usable."""
-        self.problem = problem
-        if is_used:
-            self._first = self._last = math.nan
-            return
-        self._last = now
-        if math.isnan(self._first):
-            self._first = now
-
-    def findings(self) -> list[Finding]:
-        """Return a finding if commands have arrived for a minute and none was usable."""
-        if not self._last - self._first >= _PATIENCE:
-            return []
-        unusable = said(Code.COMMANDS_UNUSABLE, problem=self.problem)
-        return [Finding(Level.WARN, StatusSignal.CHECK_FUNCTION, unusable)]
-
-
 _SILENCE = 1.0
 """Time without messages, s, after which the quality of service is suspected."""
 
@@ -104,10 +76,11 @@ class ResponseWatch:
         self._monitor: ResponseMonitor | None = None
         self._travel = math.nan
         self._written_at = monotonic()
-        if earlier := history.answers():
+        travel = monitor.settings.valve.travel
+        if earlier := history.look_up(database.read_answers, travel):
             self._begin(earlier)
-        self._trouble = _CommandTrouble()
-        self._standing = self._wrong = ""
+        self._problem = self._standing = self._wrong = ""
+        self._unusable: tuple[float, float] | None = None
 
     def _begin(self, earlier: Sequence[StepAnswer] = ()) -> ResponseMonitor:
         self._travel = self._friction.settings.valve.travel
@@ -171,7 +144,13 @@ class ResponseWatch:
             self._held += int(good.sum())
             self._wrong = wrong
         else:
-            self._trouble.take(wrong, False, monotonic())
+            self._note(wrong, is_used=False)
+
+    def _note(self, problem: str, is_used: bool) -> None:
+        """Remember the problem of the commands received now, and since when none was usable."""
+        self._problem, now = problem, monotonic()
+        first, _ = self._unusable or (now, now)
+        self._unusable = None if is_used else (first, now)
 
     def _value(self, name: str) -> Any:
         return self._node.get_parameter(name).value
@@ -194,7 +173,7 @@ class ResponseWatch:
         monitor.take(command, arrived)
         if command.stamps.size:
             why = self._standing or _clock_problem(monitor.clock_offset)
-            self._trouble.take(why or self._wrong, not why, monotonic())
+            self._note(why or self._wrong, is_used=not why)
 
     @property
     def summary(self) -> ResponseSummary | None:
@@ -219,7 +198,11 @@ class ResponseWatch:
     def findings(self) -> Sequence[Finding]:
         """Return the problems of the responses."""
         self._follow_publishers()
-        findings = self._trouble.findings()
+        findings: list[Finding] = []
+        first, last = self._unusable or (0.0, 0.0)
+        if last - first >= _PATIENCE:
+            unusable = said(Code.COMMANDS_UNUSABLE, problem=self._problem)
+            findings.append(Finding(Level.WARN, StatusSignal.CHECK_FUNCTION, unusable))
         if self._monitor is not None:
             limits = ResponseLimits(
                 self._value("deviation_limit") / 100,
@@ -238,13 +221,13 @@ class ResponseWatch:
 
     def _follow_publishers(self) -> None:
         """Adapt the quality of service; forget a command that is no longer published."""
-        silence = self._polled.watch.silence()
+        silence = self._polled.silence()
         if silence > _SILENCE:
             self._polled.follow_publishers()
         is_silent = silence > self._value("input_timeout")
         if not is_silent or self._node.count_publishers(self._polled.topic):
             return
-        self._trouble.forget()
+        self._problem, self._unusable = "", None
         if self._monitor is not None:
             self._monitor.forget()
 
@@ -253,7 +236,7 @@ class ResponseWatch:
         if monotonic() - self._written_at >= _WRITE_EVERY:
             self.close()
         monitor = self._monitor
-        why = self._standing or self._trouble.problem
+        why = self._standing or self._problem
         problem = {"stem_command problem": why} if why else {}
         if monitor is None:
             return problem

@@ -12,7 +12,6 @@
 import math
 import time
 from collections.abc import Mapping, Sequence
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -47,16 +46,14 @@ from valve_friction_ros.nodes.plumbing.polled_node import PolledNode
 from valve_friction_ros.nodes.plumbing.qos import LATCHED
 from valve_friction_ros.wording import Code, said, sentence
 
-_NO_VALUES: Mapping[str, str] = MappingProxyType({})
-
 
 def estimate_status(
     monitor: FrictionMonitor,
     name: str,
     hardware_id: str,
     findings: Sequence[Finding],
-    trend: Trend | None = None,
-    alarms: Mapping[str, str] = _NO_VALUES,
+    trend: Trend | None,
+    alarms: Mapping[str, str],
 ) -> DiagnosticStatus:
     """Compose the knowledge about a valve; the unit of a number is in its key.
 
@@ -119,7 +116,7 @@ def friction_status(
     upkeep_problems: Sequence[str],
     more: Mapping[str, str],
     findings: Sequence[Finding],
-    is_watched: bool = True,
+    is_watched: bool,
 ) -> DiagnosticStatus:
     """Compose the status of a valve at the time `now`, ns, from its estimate.
 

@@ -62,7 +62,7 @@ class UsageWatch:
         self._written: dict[tuple[int, int], Usage] = {}
         self._written_stamp: int | None = None
         self._written_at = time.monotonic()
-        found = history.usage()
+        found = history.look_up(database.read_usage)
         self._earlier = None if found is None else found.condensed()
         self._found_late: ValveUsage | None = None
         self._renewal = 0 if found is None else found.renewal

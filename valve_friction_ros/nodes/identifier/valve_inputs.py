@@ -21,7 +21,7 @@ from valve_friction_ros.nodes.plumbing.polled_node import PolledNode
 from valve_friction_ros.nodes.plumbing.polled_subscription import PolledSubscription, TakenMessage
 from valve_friction_ros.nodes.plumbing.qos import blocks, stream
 from valve_friction_ros.records.bags.topics import StreamNames
-from valve_friction_ros.streams import Arrivals, Losses, Signal
+from valve_friction_ros.streams import Arrivals, Signal
 
 _SILENCE = 0.5
 """Time without messages, s, after which the quality of service is suspected."""
@@ -60,18 +60,16 @@ class _Input(PolledSubscription):
             return None
         published = losses.recently_lost + losses.recently_taken
         return (
-            f"{100 * losses.share:.2g} % of the messages on {self.watch.topic} were lost in the "
+            f"{100 * losses.share:.2g} % of the messages on {self.topic} were lost in the "
             f"last minute ({losses.recently_lost} of {published}): they arrive faster than this "
             "process can take them, or the network drops them; publish fewer messages, or blocks "
             "on ~/samples"
         )
 
     def follow(self) -> None:
-        if self.watch.silence() > _SILENCE and self.follow_publishers():
+        if self.silence() > _SILENCE and self.follow_publishers():
             quality = self.quality.reliability.name.lower()
-            self._node.get_logger().info(
-                f"{self.watch.topic} is received as {quality}, as published"
-            )
+            self._node.get_logger().info(f"{self.topic} is received as {quality}, as published")
 
 
 class ValveInputs:
@@ -101,21 +99,18 @@ class ValveInputs:
     @property
     def names(self) -> StreamNames:
         """The fully resolved topics, and the joint."""
-        return StreamNames(self._pressure.watch.topic, self._stem.watch.topic, self._joint)
+        return StreamNames(self._pressure.topic, self._stem.topic, self._joint)
 
     def values(self) -> dict[str, str]:
         """Return the values of the diagnostic: sources and losses of the samples."""
         pressure, stem, joint = self.names
         values = {"pressure_topic": pressure, "stem_topic": stem, "stem_joint": joint}
-        for name, losses in self.losses().items():
-            values[f"{name} lost [messages]"] = str(losses.lost)
-            values[f"{name} lost [%]"] = f"{100 * losses.share:.3g}"
+        inputs = (self._pressure, self._stem, self._blocks)
+        for name, one in zip(("pressures", "positions", "blocks"), inputs, strict=True):
+            if (losses := one.losses).lost:
+                values[f"{name} lost [messages]"] = str(losses.lost)
+                values[f"{name} lost [%]"] = f"{100 * losses.share:.3g}"
         return values
-
-    def losses(self) -> dict[str, Losses]:
-        """Return the lost messages by content, where there are any."""
-        inputs = {"pressures": self._pressure, "positions": self._stem, "blocks": self._blocks}
-        return {name: one.losses for name, one in inputs.items() if one.losses.lost}
 
     def take(self, is_all: bool = False) -> None:
         """Take the samples that have arrived: a fair share per turn, or all with `is_all`.
@@ -152,12 +147,12 @@ class ValveInputs:
         While blocks arrive the other topics are not checked, because each check searches the whole
         graph.
         """
-        if self._blocks.watch.silence() <= _SILENCE:
+        if self._blocks.silence() <= _SILENCE:
             return
         for one in (self._pressure, self._stem):
             one.follow()
         now = time.monotonic()
-        silence = min(self._pressure.watch.silence(), self._stem.watch.silence())
+        silence = min(self._pressure.silence(), self._stem.silence())
         if silence > _SILENCE or now - self._looked > _SELDOM:
             self._looked = now
             self._blocks.follow()
@@ -167,7 +162,7 @@ class ValveInputs:
         return any(
             publisher.node_name == _PLAYER
             for one in self._used()
-            for publisher in self._node.get_publishers_info_by_topic(one.watch.topic)
+            for publisher in self._node.get_publishers_info_by_topic(one.topic)
         )
 
     def _take_blocks(self, blocks: Sequence[Float64MultiArray]) -> None:
@@ -179,7 +174,7 @@ class ValveInputs:
                 for block in blocks:
                     self._take_blocks([block])
                 return
-            self._bad_block = f"a block on {self._blocks.watch.topic}: {error}"
+            self._bad_block = f"a block on {self._blocks.topic}: {error}"
         else:
             self._bad_block = None
             self._hand_on(arrivals)
@@ -190,13 +185,12 @@ class ValveInputs:
         A valve needs either blocks or the two topics of samples, not both.
         """
         found = [] if self._bad_block is None else [self._bad_block]
-        problems = [one.watch.problem(timeout) for one in self._used()]
+        problems = [one.problem(timeout) for one in self._used()]
         problems += [one.loss_problem() for one in (self._pressure, self._stem, self._blocks)]
         return found + [problem for problem in problems if problem is not None]
 
     def _used(self) -> tuple[_Input, ...]:
         """Return the blocks if the last samples came in blocks or only blocks are offered."""
-        topics, blocks = (self._pressure, self._stem), self._blocks.watch
-        since_topics = min(one.watch.silence() for one in topics)
-        is_fed_by_blocks = blocks.silence() <= since_topics and blocks.is_used()
-        return (self._blocks,) if is_fed_by_blocks else topics
+        topics, blocks = (self._pressure, self._stem), self._blocks
+        since_topics = min(one.silence() for one in topics)
+        return (blocks,) if blocks.silence() <= since_topics and blocks.is_used() else topics

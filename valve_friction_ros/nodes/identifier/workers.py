@@ -13,7 +13,7 @@ import contextlib
 import time
 from collections.abc import Awaitable, Callable, Iterator
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from rclpy.callback_groups import CallbackGroup
 from rclpy.node import Node
@@ -32,7 +32,7 @@ from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.identification.methods import compile_methods
 from valve_friction_ros.model.compiled import find_cache, note_cache
 from valve_friction_ros.nodes.identifier.status import NumberTopics
-from valve_friction_ros.nodes.plumbing.processes import Processes, ThisProcess
+from valve_friction_ros.nodes.plumbing.processes import Processes
 from valve_friction_ros.nodes.plumbing.worker import InternalError, Worker, bugs_reported, done_in
 
 _AT_ONCE = 2
@@ -76,17 +76,21 @@ class Workers(NamedTuple):
     """Resources shared by all valves of a process.
 
     They are the threads that identify, write bags and reports, combine moves, write the history and
-    send alerts; the daily digest of alarms; and `apart`, which runs work that needs much memory:
-    identifications and pages.
+    send alerts; the daily digest of alarms; and `apart`, which calls a function that needs much
+    memory, for identifications and pages.
     """
 
-    apart: ThisProcess
+    apart: Callable[..., Any]
     identify: Worker
     files: Worker
     history: HistoryThread
     evidence: Worker
     alerts: AlertSender
     digest: DigestDesk
+
+
+def _call(work: Callable[..., Any], *arguments: Any) -> Any:
+    return work(*arguments)
 
 
 @contextlib.contextmanager
@@ -98,14 +102,15 @@ def running_workers(processes: int = 0) -> Iterator[Workers]:
     processes : int
         Largest number of processes that identify in parallel; 0: threads of this process.
     """
-    apart = Processes() if processes else ThisProcess()
+    apart = Processes()
+    call = apart.done if processes else _call
 
     def prepare() -> None:
-        note_cache(apart.done(find_cache))
-        apart.done(compile_methods)
+        note_cache(call(find_cache))
+        call(compile_methods)
 
     workers = Workers(
-        apart,
+        call,
         Worker("identify", prepare, threads=processes or _AT_ONCE),
         Worker("files"),
         HistoryThread(),
@@ -198,7 +203,7 @@ class Identification:
                 workers = self._workers
                 result, numbers = await done_in(
                     workers.identify,
-                    workers.apart.done,
+                    workers.apart,
                     identify_with_numbers,
                     record.snapshot,
                     record.settings,

@@ -119,7 +119,8 @@ class OutputFolder:
         `write` receives the folder and a file name for this time (ns), and returns the path. Raises
         RefusalError and removes the file if there is not enough space.
         """
-        valve, name = valve_name(node), file_name(node, stamp)
+        valve = valve_name(node)
+        name = f"{valve}_{utc(stamp):%Y%m%dT%H%M%SZ}"
         room = 1e6 * node.get_parameter("save_megabytes").value
 
         def write_within_room() -> Path:
@@ -142,11 +143,6 @@ class OutputFolder:
 def valve_name(node: Node) -> str:
     """Return the name of the node's valve for file names; ROS allows no dots or signs in it."""
     return node.get_namespace().strip("/").replace("/", "_") or node.get_name()
-
-
-def file_name(node: Node, stamp: int) -> str:
-    """Return a file name, without extension, from the node's valve and a time (ns)."""
-    return f"{valve_name(node)}_{utc(stamp):%Y%m%dT%H%M%SZ}"
 
 
 def free_path(folder: Path, name: str, ending: str) -> Path:
@@ -172,7 +168,7 @@ def _size_of(path: Path) -> int:
 def require_room(folder: Path, valve: str, room: float, is_there: bool = False) -> None:
     """Require that the files of a valve in a folder take less than `room`, bytes.
 
-    Files belong to the valve if they are named as by `file_name`. If the last file has already been
+    Files belong to the valve if they have its name and a time. If the last file has already been
     written (`is_there`), they may take exactly `room`.
 
     Raises RefusalError if they take more.

@@ -56,14 +56,13 @@ def _descriptor(setting: Setting) -> ParameterDescriptor:
     return descriptor
 
 
-def declare_parameters(node: Node, settings: Iterable[Setting], **defaults: object) -> None:
+def declare_parameters(node: Node, settings: Iterable[Setting]) -> None:
     """Declare `settings` on `node`; raises rclpy's parameter exceptions for a bad override.
 
-    `defaults` replace the declared defaults on this node. A number may later be set as text,
-    because ``ros2 param load`` sends ``.nan`` and ``1e-06`` as text. Raises ValueError for an
-    override with a name that no node of this package declares, if it was given by ``-p`` or
-    resembles a declared name. Other unknown overrides, as in a file shared with other packages, are
-    logged.
+    A number may later be set as text, because ``ros2 param load`` sends ``.nan`` and ``1e-06`` as
+    text. Raises ValueError for an override with a name that no node of this package declares, if it
+    was given by ``-p`` or resembles a declared name. Other unknown overrides, as in a file shared
+    with other packages, are logged.
     """
     declared = tuple(settings)
     _require_known(node, {one.name for one in declared})
@@ -74,7 +73,7 @@ def declare_parameters(node: Node, settings: Iterable[Setting], **defaults: obje
 
     node.add_on_set_parameters_callback(check)
     for one in declared:
-        node.declare_parameter(one.name, defaults.get(one.name, one.default), _descriptor(one))
+        node.declare_parameter(one.name, one.default, _descriptor(one))
     numbers = {
         one.name for one in declared if one.default is None or isinstance(one.default, float)
     }

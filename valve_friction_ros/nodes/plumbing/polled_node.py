@@ -272,10 +272,6 @@ class PolledNode(Node):
         """Bugs in the latest work of the node, one line each, until that work succeeds."""
         return tuple(dict.fromkeys(self._failures.values()))
 
-    def failure_of(self, work: str) -> str | None:
-        """Return the bug in the latest work of this name, or None."""
-        return self._failures.get(work)
-
     @contextlib.contextmanager
     def guarded(self, work: str) -> Iterator[None]:
         """Confine a bug in some work to this node: log it once, and let the process continue.
@@ -434,16 +430,16 @@ async def _answer(node: Node, service: Service, request: object, header: object)
 
 def create_service(
     node: PolledNode,
-    kind: type,
     name: str,
-    work: Callable[[Any], Awaitable[str]],
+    work: Callable[..., Awaitable[str]],
     failure: str = "",
+    kind: type = Trigger,
 ) -> None:
-    """Create a service that answers with `success` and `message`, like those of std_srvs.
+    """Create a std_srvs/Trigger service, or a SetBool service whose value `work` receives.
 
-    The coroutine `work` receives the request. It returns the message of a success, or raises
-    RefusalError with the reason; any other exception is answered as an internal error. If `failure`
-    is given, a refusal is logged after this text.
+    The coroutine `work` returns the message of a success, or raises RefusalError with the reason;
+    any other exception is answered as an internal error. If `failure` is given, a refusal is logged
+    after this text.
     """
 
     async def answer(request: Any, response: Any) -> Any:
@@ -454,7 +450,7 @@ def create_service(
                     f"with `ros2 lifecycle set {node.get_fully_qualified_name()} activate`"
                 )
             with bugs_reported(node):
-                response.message = await work(request)
+                response.message = await (work() if kind is Trigger else work(request.data))
             response.success = True
         except (RefusalError, InternalError) as error:
             response.message = str(error)
@@ -463,13 +459,3 @@ def create_service(
         return response
 
     node.create_service(kind, name, answer, qos_profile=REQUESTS)
-
-
-def create_trigger_service(
-    node: PolledNode,
-    name: str,
-    work: Callable[[], Awaitable[str]],
-    failure: str = "",
-) -> None:
-    """Create a std_srvs/Trigger service (`create_service`)."""
-    create_service(node, Trigger, name, lambda _: work(), failure)

@@ -55,7 +55,7 @@ class InputWatch:
 
     def __init__(self, node: Node, topic: str, type_name: str) -> None:
         self._node = node
-        self.topic, self._type = topic, type_name
+        self.topic, self.type_name = topic, type_name
         self._since = time.monotonic()
         self._has_arrived = False
 
@@ -78,11 +78,11 @@ class InputWatch:
         if silence <= timeout:
             return None
         publishers = self._node.get_publishers_info_by_topic(self.topic)
-        others = sorted({info.topic_type for info in publishers} - {self._type})
+        others = sorted({info.topic_type for info in publishers} - {self.type_name})
         if not publishers:
             cause = "it has no publisher"
         elif others:
-            cause = f"it is published as {', '.join(others)}, not {self._type}"
+            cause = f"it is published as {', '.join(others)}, not {self.type_name}"
         else:
             cause = "its publisher is silent"
             if not self._has_arrived and silence < _LEASE:
@@ -92,7 +92,7 @@ class InputWatch:
         return f"no data on {self.topic} for {silence:.1f} s: {cause}"
 
 
-class PolledSubscription:
+class PolledSubscription(InputWatch):
     """A subscription that no executor waits for, if this can be avoided.
 
     Parameters ``qos_overrides.…`` can override history, depth and reliability. The depth of
@@ -108,9 +108,9 @@ class PolledSubscription:
         Type of the messages, such as ``sensor_msgs/msg/JointState``.
     has_more : bool
         Whether the last call of `take` may have left messages behind.
-    watch : InputWatch
-        Monitors the arrival of messages.
     """
+
+    _node: PolledNode
 
     def __init__(
         self,
@@ -121,11 +121,9 @@ class PolledSubscription:
         raw: bool = False,
         is_optional: bool = False,
     ) -> None:
-        self._node = node
+        type_name = f"{kind.__module__.split('.')[0]}/msg/{kind.__name__}"
+        super().__init__(node, node.resolve_topic_name(topic), type_name)
         self._kind, self._raw, self._quality = kind, raw, quality
-        self.topic: str = node.resolve_topic_name(topic)
-        self.type_name = f"{kind.__module__.split('.')[0]}/msg/{kind.__name__}"
-        self.watch = InputWatch(node, self.topic, self.type_name)
         self._handed_over: deque[tuple[Any, dict[str, Any]]] = deque(maxlen=quality.depth)
         self._counter = LossCounter()
         self.has_more = False
@@ -218,7 +216,7 @@ class PolledSubscription:
         if taken:
             now = time.monotonic()
             self._node.last_heard = now
-            self.watch.arrived()
+            self.arrived()
             known = [number for number in numbers if number is not None]
             if len(known) == len(numbers):  # not every middleware numbers messages
                 self._counter.take(known, now)

@@ -30,6 +30,8 @@ from valve_friction_ros.identification import RefusalError
 
 _Result = TypeVar("_Result")
 
+_Child = subprocess.Popen[bytes]
+
 _KEPT = 10.0
 """Time, s, for which an idle process waits for more work. A process holds some 240 MB, and its
 start takes a second of processor time."""
@@ -72,48 +74,7 @@ def imported(module: str, name: str, *arguments: Any) -> Any:
     return getattr(import_module(module), name)(*arguments)
 
 
-class ThisProcess:
-    """Runs work in the calling thread."""
-
-    def done(self, work: Callable[..., _Result], *arguments: Any) -> _Result:
-        """Run `work`; return its result or raise its exception."""
-        return work(*arguments)
-
-    def end(self) -> None:
-        """Stop working."""
-
-
-class _Child:
-    """A process that runs one job after the other from its input."""
-
-    def __init__(self) -> None:
-        self._process = subprocess.Popen(
-            [sys.executable, "-m", __name__],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            env=os.environ | {"PYTHONPATH": os.pathsep.join(map(os.path.abspath, sys.path))},
-            start_new_session=True,  # Ctrl-C is for the parent
-        )
-        self.end_later: threading.Timer | None = None
-
-    def done(self, work: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
-        """Run `work` in the child; return its result, or its exception and where it was raised.
-
-        Raises EOFError or OSError if the child dies.
-        """
-        process = self._process
-        assert process.stdin is not None and process.stdout is not None  # noqa: PT018, S101
-        pickle.dump(_packed((work, arguments)), process.stdin)
-        process.stdin.flush()
-        return pickle.loads(pickle.load(process.stdout))  # noqa: S301 - of this package's process
-
-    def end(self) -> None:
-        self._process.kill()
-        with contextlib.suppress(OSError):  # it ended with output left to read
-            self._process.communicate()
-
-
-class Processes(ThisProcess):
+class Processes:
     """Processes that start on demand and end some seconds after their last job.
 
     They are spawned, not forked: a fork would keep the locks of the middleware's threads without
@@ -121,7 +82,7 @@ class Processes(ThisProcess):
     """
 
     def __init__(self) -> None:
-        self._free: list[_Child] = []
+        self._free: dict[_Child, threading.Timer] = {}
         self._all: set[_Child] = set()
         self._lock = threading.Lock()
 
@@ -132,7 +93,7 @@ class Processes(ThisProcess):
         """
         child = self._taken()
         try:
-            result, error, told = child.done(work, arguments)
+            result, error, told = _done_by(child, work, arguments)
         except (EOFError, OSError, pickle.UnpicklingError):
             self._end(child)
             raise RefusalError(
@@ -156,33 +117,55 @@ class Processes(ThisProcess):
     def _taken(self) -> _Child:
         """Return the idle process that has worked most recently, or a new process."""
         with self._lock:
-            while self._free:
-                child = self._free.pop()
-                assert child.end_later is not None  # noqa: S101 - it waits for its end
-                child.end_later.cancel()
-                return child
-            child = _Child()
-            self._all.add(child)
+            if self._free:
+                child, end_later = self._free.popitem()
+                end_later.cancel()
+            else:
+                child = _started()
+                self._all.add(child)
             return child
 
     def _give_back(self, child: _Child) -> None:
-        child.end_later = threading.Timer(_KEPT, self._end_if_free, [child])
-        child.end_later.daemon = True
+        end_later = threading.Timer(_KEPT, self._end_if_free, [child])
+        end_later.daemon = True
         with self._lock:
-            self._free.append(child)
-        child.end_later.start()
+            self._free[child] = end_later
+        end_later.start()
 
     def _end_if_free(self, child: _Child) -> None:
         with self._lock:
-            if child not in self._free:
-                return
-            self._free.remove(child)
-        self._end(child)
+            is_free = self._free.pop(child, None) is not None
+        if is_free:
+            self._end(child)
 
     def _end(self, child: _Child) -> None:
         with self._lock:
             self._all.discard(child)
-        child.end()
+        child.kill()
+        with contextlib.suppress(OSError):  # it ended with output left to read
+            child.communicate()
+
+
+def _started() -> _Child:
+    """Start a process that runs one job after the other from its input."""
+    return subprocess.Popen(
+        [sys.executable, "-m", __name__],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        env=os.environ | {"PYTHONPATH": os.pathsep.join(map(os.path.abspath, sys.path))},
+        start_new_session=True,  # Ctrl-C is for the parent
+    )
+
+
+def _done_by(child: _Child, work: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
+    """Return the result of a job in a child, or its exception and where it was raised.
+
+    Raises EOFError or OSError if the child dies.
+    """
+    assert child.stdin is not None and child.stdout is not None  # noqa: PT018, S101
+    pickle.dump(_packed((work, arguments)), child.stdin)
+    child.stdin.flush()
+    return pickle.loads(pickle.load(child.stdout))  # noqa: S301 - of this package's process
 
 
 def _packed(what: object) -> bytes:

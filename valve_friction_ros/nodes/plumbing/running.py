@@ -295,9 +295,12 @@ def _run(
             executor.answer()
         return time.monotonic()
 
+    def is_over() -> bool:
+        return stop.has_come or not rclpy.ok()
+
     least = _PAUSE_OF_A_NODE * len(nodes)
     lively_until = time.monotonic() + _LIVELY_TIME
-    while not _is_over(stop):
+    while not is_over():
         is_lively, looked = False, time.monotonic()
         for executor in executors:
             is_lively |= executor.turn()
@@ -309,17 +312,13 @@ def _run(
             # The whole turn may be long if hundreds of nodes share a slow core.
             watchdog.turned()
             deadman.goes_on()
-            if _is_over(stop):
+            if is_over():
                 return
         deadman.turned()
         now = time.monotonic()
         if is_lively:
             lively_until = now + _LIVELY_TIME
         time.sleep(max(least, _LIVELY_PAUSE if now < lively_until else _PAUSE))
-
-
-def _is_over(stop: StopRequest) -> bool:
-    return stop.has_come or not rclpy.ok()
 
 
 def join_graph(arguments: Sequence[str] | None, context: Context | None = None) -> None:
@@ -407,8 +406,3 @@ def _close(nodes: Sequence[Node], executors: Mapping[Context, TurnExecutor]) -> 
     for context in executors:
         context.try_shutdown()
     rclpy.try_shutdown()
-
-
-def run_node(create: Callable[[], Node], arguments: Sequence[str] | None = None) -> int:
-    """Run one node, as `run_nodes` does."""
-    return run_nodes(lambda: [create()], arguments)

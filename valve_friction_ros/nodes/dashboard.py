@@ -47,11 +47,7 @@ from valve_friction_ros.dashboard.live_state import Sources
 from valve_friction_ros.dashboard.live_strip import LiveStrip
 from valve_friction_ros.history import server_from
 from valve_friction_ros.nodes.plumbing.managed_node import ManagedNode
-from valve_friction_ros.nodes.plumbing.messages import (
-    positions_in,
-    pressures_in,
-    readable,
-)
+from valve_friction_ros.nodes.plumbing.messages import positions_in, pressures_in, readable
 from valve_friction_ros.nodes.plumbing.output_folder import folder_of
 from valve_friction_ros.nodes.plumbing.parameters import declare_parameters, values_of
 from valve_friction_ros.nodes.plumbing.polled_node import PolledNode, TurnExecutor
@@ -453,7 +449,7 @@ def _serve(node: Dashboard, limited: contextlib.ExitStack) -> int:
     try:
         from valve_friction_ros.dashboard.pages import server  # noqa: PLC0415
     except ModuleNotFoundError as error:
-        if error.name and error.name.split(".")[0] == __name__.split(".", maxsplit=1)[0]:
+        if error.name and error.name.startswith("valve_friction_ros."):
             raise
         print(_MISSING, file=sys.stderr)  # noqa: T201
         return 2
@@ -482,4 +478,6 @@ def _serve(node: Dashboard, limited: contextlib.ExitStack) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    from valve_friction_ros.nodes.start import dashboard
+
+    sys.exit(dashboard())

@@ -7,18 +7,105 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Samples by the block on `~/samples`: the same numbers, the same rules, and what is no block."""
+"""Inputs of an identifier: missing and mismatched ones are warned of; samples by the block."""
+
+import contextlib
 
 import numpy as np
 import pytest
-from live_nodes import NAMESPACE, STREAM, stamps_of, values_of
+from live_nodes import NAMESPACE, OK, START, STREAM, WARN, stamps_of, values_of
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 from records import quick_record
-from std_msgs.msg import Float64MultiArray, MultiArrayDimension, MultiArrayLayout
+from sensor_msgs.msg import FluidPressure, JointState
+from std_msgs.msg import Float64MultiArray, MultiArrayDimension, MultiArrayLayout, String
 
 from valve_friction_ros.identification import identify
 from valve_friction_ros.model import BENCH_VALVE
 
-OK, WARN = b"\x00", b"\x01"
+PRESSURE, STEM = f"{NAMESPACE}/actuator_pressure", f"{NAMESPACE}/stem_state"
+
+
+@pytest.fixture(scope="module")
+def client(shared):
+    shared.start("identifier", {"input_timeout": 2.0})  # it reports silence soon
+    return shared.client
+
+
+@contextlib.contextmanager
+def publisher(client, kind, topic, qos=STREAM):
+    made = client.node.create_publisher(kind, topic, qos)
+    try:
+        yield made
+    finally:
+        client.node.destroy_publisher(made)
+
+
+def warned_of(client, topic, cause):
+    """Wait for a warning of one cause for one topic."""
+    return client.next_status(
+        lambda status: any(
+            f"no data on {topic} for" in part and cause in part
+            for part in status.message.split("; ")
+        ),
+        f"a warning that {topic}: {cause}",
+    )
+
+
+def test_nobody_publishes(client):
+    for topic in (PRESSURE, STEM):
+        status = warned_of(client, topic, "it has no publisher")
+        assert status.level == WARN
+    values = values_of(status)
+    assert values["NE 107"] == "C"
+    assert values["estimate_valid"] == "false"
+    assert "nothing has been identified yet" in status.message
+
+
+def test_wrong_type(client):
+    with publisher(client, String, STEM) as wrong:
+        status = warned_of(client, STEM, "it is published as std_msgs/msg/String")
+        wrong.publish(String(data="0.01"))
+        assert "not sensor_msgs/msg/JointState" in status.message
+        assert status.level == WARN
+        warned_of(client, PRESSURE, "it has no publisher")
+
+
+def test_silent_publisher(client):
+    with publisher(client, FluidPressure, PRESSURE):
+        status = warned_of(client, PRESSURE, "its publisher is silent")
+        assert status.level == WARN
+        warned_of(client, STEM, "it has no publisher")
+
+
+def sends_until_taken(client, made):
+    """Publish stem positions until some have got into the buffer."""
+    stamp = START
+
+    def is_taken():
+        nonlocal stamp
+        stamp += 20_000_000
+        message = JointState(name=["stem"], position=[0.0])
+        message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, 10**9)
+        made.publish(message)
+        return STEM not in client.statuses[-1][1].message
+
+    client.wait_until(is_taken, "samples of the stem")
+
+
+def test_best_effort_and_reliable_publishers_alike(client):
+    best_effort = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
+    for quality in (best_effort, STREAM, best_effort):
+        warned_of(client, STEM, "it has no publisher")
+        with publisher(client, JointState, STEM, quality) as made:
+            sends_until_taken(client, made)
+    warned_of(client, STEM, "it has no publisher")
+    with (
+        publisher(client, JointState, STEM),
+        publisher(client, JointState, STEM, best_effort) as made,
+    ):
+        sends_until_taken(client, made)
+
+
 TOPIC = f"{NAMESPACE}/identifier/samples"
 COLUMNS = "time,pressure,position"
 RECORD = quick_record()
@@ -36,13 +123,11 @@ def block(rows, labels=("sample", COLUMNS), sizes=None):
 
 
 @pytest.fixture(scope="module")
-def fed(shared):
-    """Client of an identifier that reports silence soon, and the publisher of its blocks."""
-    shared.start("identifier", {"input_timeout": 2.0})
-    client = shared.client
-    publisher = client.node.create_publisher(Float64MultiArray, TOPIC, STREAM)
-    client.wait_until(publisher.get_subscription_count, "the subscription")
-    return client, publisher
+def fed(client):
+    """The client, and the publisher of its blocks."""
+    blocks = client.node.create_publisher(Float64MultiArray, TOPIC, STREAM)
+    client.wait_until(blocks.get_subscription_count, "the subscription")
+    return client, blocks
 
 
 def send(publisher, rows, size=50):
