@@ -33,7 +33,6 @@ from valve_friction_ros.planning import (
     StrokePlan,
     plan_remarks,
     plan_test,
-    set_points,
 )
 from valve_friction_ros.planning.search import Forecast
 from valve_friction_ros.planning.steps import (
@@ -41,6 +40,7 @@ from valve_friction_ros.planning.steps import (
     FINEST_PRESSURE,
     ShownUnit,
     form_of,
+    set_points,
     stem_limits,
     table_of,
 )

@@ -28,7 +28,7 @@ from valve_friction_ros.identification import (
     UNITS,
     IdentificationSettings,
 )
-from valve_friction_ros.planning import AIMS, Conditions, Limits
+from valve_friction_ros.planning.conditions import AIMS, STOP_MARGIN, Conditions, Limits
 from valve_friction_ros.settings import identification_from
 
 if TYPE_CHECKING:
@@ -93,7 +93,7 @@ def _add_limits(parser: argparse.ArgumentParser) -> None:
         --from PERCENT: lowest position, in percent of travel ({100 * default.lowest:g})
         --to PERCENT: highest position ({100 * default.highest:g})
         --allow-stops: let the stem reach seat and stop; otherwise even a stem without friction
-            stays {100 * default.stop_margin:g} %% of travel away from them
+            stays {100 * STOP_MARGIN:g} %% of travel away from them
         """,
         **{"from": lowest},
         to={"dest": "highest", "type": _percent, "default": default.highest},
