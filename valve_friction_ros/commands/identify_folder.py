@@ -75,13 +75,11 @@ from valve_friction_ros.history import HistoryError
 from valve_friction_ros.identification import FIXABLE
 from valve_friction_ros.model import Valve
 from valve_friction_ros.model.checks import frozen
-from valve_friction_ros.records.bags.topics import is_bag
+from valve_friction_ros.records.bags.topics import VALVE_FILE, is_bag
 from valve_friction_ros.records.files import explained, on_disk, place
 from valve_friction_ros.records.recordings import ReadingOptions
 from valve_friction_ros.records.valve_file import ValveFile, read_valve_file
 from valve_friction_ros.streams import utc_second
-
-_VALVE_FILE = "valve.yaml"
 
 
 @dataclass(frozen=True)
@@ -100,9 +98,9 @@ class Plan:
 def _valve_file(found: FoundRecording, common: Path | None) -> Path | None:
     """Choose the valve file closest to a recording."""
     beside = found.path.parent
-    places = [beside / f"{found.stem}.{_VALVE_FILE}", beside / _VALVE_FILE]
+    places = [beside / f"{found.stem}.{VALVE_FILE}", beside / VALVE_FILE]
     if found.path.is_dir():
-        places.insert(1, found.path / _VALVE_FILE)
+        places.insert(1, found.path / VALVE_FILE)
     return next((place for place in places if place.exists()), common)
 
 
