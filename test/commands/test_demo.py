@@ -28,7 +28,6 @@ from waiting import wait_until
 from valve_friction_ros.commands.demo import command as demo
 from valve_friction_ros.commands.demo import plant
 from valve_friction_ros.commands.demo.bench import (
-    BenchError,
     NodeProcess,
     quick_discovery,
     running_nodes,
@@ -40,6 +39,7 @@ from valve_friction_ros.identification import (
     UNITS,
     IdentificationSettings,
     Parameter,
+    RefusalError,
     Verdict,
     identify_bench,
 )
@@ -130,8 +130,8 @@ class TestReport:
         def report(outcomes, level):
             output = tmp_path / "[b]demo.png"  # not to be taken for bold
             stream = io.StringIO()
-            story = demo._Story(outcomes, level, "excess friction")
-            code = demo._report(story, output, Console(file=stream, width=200))
+            console = Console(file=stream, width=200)
+            code = demo._report(outcomes, level, "excess friction", output, console)
             words = stream.getvalue()
             assert f"picture: {output}" in words
             assert output.read_bytes().startswith(PNG)
@@ -240,7 +240,7 @@ class TestIdentify:
     def test_no_published_estimate_is_a_failure_with_its_reason(self, quick_record, values):
         withheld = {name: value for name, value in values.items() if "published" not in name}
         del withheld["threshold [m/s]"]
-        with pytest.raises(BenchError, match=r"^no published estimate: check the clocks$"):
+        with pytest.raises(RefusalError, match=r"^no published estimate: check the clocks$"):
             identified(FakeClient(quick_record, withheld), "loose", LOW_FRICTION)
 
 
@@ -384,19 +384,13 @@ def test_what_a_client_is_told(ros_environment):
     assert done.returncode == 0, done.stderr
     assert "Traceback" not in done.stderr
     told = json.loads(done.stdout)
-    assert told["before"] == [0.0, None, ""]
+    assert told["before"] == [0.0, None, {}]
     assert told["identify"].startswith("identify: no ")
     assert "actuator_pressure" in told["identify"]
     assert told["clear"]
-    assert told["impossible"].startswith("simulator refused: ")
+    assert told["impossible"].startswith("/fv_7/simulator refused: ")
     assert "static_friction" in told["impossible"]
     assert told["possible"] is None
-    assert told["absent node"] == (
-        "no answer of /fv_7/nobody/set_parameters_atomically within 0.1 s"
-    )
-    assert told["absent service"] == (
-        "/fv_7/identifier/dance is not available: start the identifier of this valve"
-    )
     assert "actuator_pressure" in told["message"]
     assert told["estimate_valid"] == "false"
     assert told["exit codes"] == [0, 0]

@@ -20,7 +20,6 @@ from valve_friction_ros.commands.console import OutputConsole
 from valve_friction_ros.commands.process import ExitCode, StopSignals, complain
 from valve_friction_ros.identification import RefusalError
 
-REFUSALS = (RefusalError,)
 _DISCOVERY = 5.0
 """Time to search for an identifier, s. Chosen: nodes on a network find each other in 1 to 3 s."""
 

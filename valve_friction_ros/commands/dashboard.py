@@ -25,9 +25,6 @@ from valve_friction_ros.dashboard.context import (
     NoSignals,
 )
 from valve_friction_ros.dashboard.history_cache import KeptValves
-from valve_friction_ros.history import HistoryError
-
-REFUSALS = (HistoryError,)
 
 
 def _log(line: str) -> None:

@@ -28,7 +28,6 @@ from valve_friction_ros.history import (
     AlarmRecording,
     History,
     HistoryEntry,
-    HistoryError,
     KeptBaseline,
     KeptValve,
     Trend,
@@ -379,9 +378,6 @@ def _trend_lines(trend: Trend | None) -> list[str]:
             f"{expected} (95 %: {earliest} to {latest})"
         )
     return lines
-
-
-REFUSALS = (HistoryError,)
 
 
 def _usages(options: argparse.Namespace) -> list[tuple[KeptValve, ValveUsage]]:

@@ -125,9 +125,6 @@ def _dated(path: Path, zone: str) -> str:
     return f"its file was last changed {in_zone(changed, zone)}"
 
 
-REFUSALS = (RefusalError,)
-
-
 class _Answer(NamedTuple):
     """A valve of the file, its result or refusal, and its diagnosis and findings if requested."""
 

@@ -71,7 +71,6 @@ from valve_friction_ros.fleet.rows import (
     with_reports_written,
 )
 from valve_friction_ros.health import Level
-from valve_friction_ros.history import HistoryError
 from valve_friction_ros.identification import FIXABLE
 from valve_friction_ros.model import Valve
 from valve_friction_ros.model.checks import frozen
@@ -310,9 +309,6 @@ def print_alarms(rows: Iterable[Mapping[str, Cell]]) -> None:
             console.print(f"       {row['what_to_do']}", soft_wrap=True)
     if len(alarms) > _SHOWN_ALARMS:
         console.print(f"       and {len(alarms) - _SHOWN_ALARMS} more")
-
-
-REFUSALS = (HistoryError,)
 
 
 def _require_own_file(options: argparse.Namespace) -> None:

@@ -29,13 +29,11 @@ from valve_friction_ros.commands.arguments.recording import (
 )
 from valve_friction_ros.commands.console import plain_console
 from valve_friction_ros.commands.process import ExitCode, complain
-from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.outside_text import printable
 from valve_friction_ros.records.layout import Layout
 from valve_friction_ros.records.table import OpenTables, ReadSignal
 from valve_friction_ros.streams import utc_second
 
-REFUSALS = (RefusalError,)
 _DATED = 946_684_800_000_000_000
 """Time, ns since 1970, from which a stamp is taken for a date: the year 2000."""
 _GAP = 10

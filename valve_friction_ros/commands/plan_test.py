@@ -25,8 +25,7 @@ from valve_friction_ros.commands.arguments import require_outputs
 from valve_friction_ros.commands.arguments.planning import frictions_from, planned_settings
 from valve_friction_ros.commands.console import OutputConsole, plain_console
 from valve_friction_ros.commands.process import ExitCode
-from valve_friction_ros.history import HistoryError
-from valve_friction_ros.identification import SLIDING, UNITS, RefusalError, percentage, plain
+from valve_friction_ros.identification import SLIDING, UNITS, percentage, plain
 from valve_friction_ros.planning import (
     Conditions,
     Limits,
@@ -239,9 +238,6 @@ def _units(options: argparse.Namespace) -> tuple[ShownUnit, ShownUnit]:
         ShownUnit(options.pressure_unit, pressure, FINEST_PRESSURE),
         ShownUnit(options.position_unit, position, FINEST_POSITION),
     )
-
-
-REFUSALS = (RefusalError, HistoryError)
 
 
 def _planned(options: argparse.Namespace) -> StrokePlan:

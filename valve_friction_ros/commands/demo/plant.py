@@ -20,8 +20,9 @@ from typing import NamedTuple
 
 from rich.console import Console
 
-from valve_friction_ros.commands.demo.bench import BenchError, NodeProcess, running_nodes
+from valve_friction_ros.commands.demo.bench import NodeProcess, running_nodes
 from valve_friction_ros.commands.process import ExitCode
+from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.model import BENCH_VALVE, SquareWave
 from valve_friction_ros.nodes.service_call import Caller, caller
 
@@ -67,11 +68,11 @@ VALVES = (
 
 
 def require_dashboard() -> None:
-    """Raise BenchError if NiceGUI is not installed."""
+    """Raise RefusalError if NiceGUI is not installed."""
     if importlib.util.find_spec("nicegui") is None:
         from valve_friction_ros.dashboard.context import INSTALL  # noqa: PLC0415 - rarely needed
 
-        raise BenchError(
+        raise RefusalError(
             f"the dashboard needs NiceGUI: run `{INSTALL}`, or `make demo DEMO_ARGS=--dashboard`"
         )
 
@@ -162,7 +163,7 @@ def _wait_for_page(process: subprocess.Popen[bytes], port: int) -> None:
             if tried.connect_ex(("127.0.0.1", port)) == 0:
                 return
         time.sleep(0.1)
-    raise BenchError(f"the dashboard did not open port {port} within {_START_TIMEOUT:g} s")
+    raise RefusalError(f"the dashboard did not open port {port} within {_START_TIMEOUT:g} s")
 
 
 def show_plant(console: Console, home: Path) -> int:
