@@ -50,7 +50,7 @@ def visit(client):
         "impossible": set_parameters({"coulomb_friction": 1e6}),
         "possible": set_parameters({"coulomb_friction": 700.0, "static_friction": 800.0}),
     }
-    client.wait(lambda: client.status.level[0] == Level.WARN, 30.0, "warning")
+    client.wait(lambda: client.status and client.status.level[0] == Level.WARN, 30.0, "warning")
     return seen | {
         "message": client.status.message,
         "estimate_valid": client.diagnostic_values["estimate_valid"],

@@ -9,7 +9,6 @@
 
 """The sub-command `identify` as people and programs use it: table, picture, JSON, and refusals."""
 
-import dataclasses
 import json
 import math
 import re
@@ -21,13 +20,10 @@ import numpy as np
 import pytest
 from answers import KEYS, column, known, none_for_nan, row_of, values
 
-from valve_friction_ros.commands.identify import print_table
 from valve_friction_ros.identification import (
     PARAMETER_UNITS,
     UNITS,
     IdentificationSettings,
-    Parameter,
-    Verdict,
     identify_bench,
     published_estimate,
 )
@@ -81,25 +77,6 @@ class TestTable:
         assert "window 31 samples" in words
         for warning in answer["warnings"]:
             assert f"note: {warning}" in words
-
-    def test_doubt_of_the_model_is_a_note(self, result, capsys):
-        """And what was not identified leaves a dash, the published value beside it or not."""
-        doubt = "the Karnopp model does not describe this valve: 98 µm [of the misfit] is not noise"
-        friction = Parameter(
-            "coulomb_friction", math.nan, math.nan, math.nan, Verdict.NOT_IDENTIFIABLE, doubt
-        )
-        doubted = dataclasses.replace(
-            result,
-            warnings=(doubt,),
-            parameters={**result.parameters, "coulomb_friction": friction},
-        )
-        print_table(doubted)
-        out = capsys.readouterr().out
-        assert row_of(out, "coulomb_friction") == "coulomb_friction – N not identifiable"
-        words = " ".join(out.split())
-        assert f"coulomb_friction not identifiable: {doubt}" in words
-        assert f"note: {doubt}" in words
-        assert "nan" not in out
 
 
 class TestPlot:

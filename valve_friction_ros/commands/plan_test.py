@@ -112,17 +112,12 @@ def _forecast_json(name: str, one: Forecast, travel: float) -> dict[str, Any]:
 
 def as_json(plan: StrokePlan, path: Path) -> dict[str, Any]:
     """Build the JSON object in SI units."""
-    pattern = plan.test.pattern
     return {
         "file": str(path),
         "aim": plan.aim,
         "duration": plan.test.duration,
         "cycles": plan.test.cycles,
-        "pattern": {
-            "shapes": [*pattern.shapes],
-            "speeds": [*pattern.speeds],
-            "hold": pattern.hold,
-        },
+        "pattern": plain(vars(plan.test.pattern)),
         "start_pressure": float(plan.test.pressures[0]),
         "pressure_range": [plan.band.low, plan.band.high],
         "pressure_rate": plan.test.largest_rate,
@@ -133,13 +128,9 @@ def as_json(plan: StrokePlan, path: Path) -> dict[str, Any]:
         ],
         "tried": plan.tried,
         "warnings": [*plan_remarks(plan)],
-        "play": _plain(player(plan, path)),
-        "play_on_bench": _plain(player(plan, path, on_bench=True)),
+        "play": plain(player(plan, path)),
+        "play_on_bench": plain(player(plan, path, on_bench=True)),
     }
-
-
-def _plain(values: dict[str, Any]) -> dict[str, Any]:
-    return {name: plain(one) if isinstance(one, float) else one for name, one in values.items()}
 
 
 def _cell(one: Forecast, name: str) -> str:
