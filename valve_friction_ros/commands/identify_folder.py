@@ -18,7 +18,7 @@ from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
 from valve_friction_ros.commands.arguments.identification import (
@@ -28,7 +28,7 @@ from valve_friction_ros.commands.arguments.identification import (
     survey_limits,
 )
 from valve_friction_ros.commands.arguments.recording import described, reading_options
-from valve_friction_ros.commands.console import OutputConsole
+from valve_friction_ros.commands.console import OutputConsole, shown_progress
 from valve_friction_ros.commands.process import ExitCode, StopSignals, complain
 from valve_friction_ros.fleet.cluster import cluster_at, in_cluster
 from valve_friction_ros.fleet.job import (
@@ -394,11 +394,8 @@ def _identify(
     """
     filings: list[Filing] = []
     shown: set[str] = set()
-    console = OutputConsole(stderr=True, highlight=False, markup=False, soft_wrap=True)
     columns = (TextColumn("identifying"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(
-        *columns, console=console, transient=True, disable=not console.is_terminal
-    ) as progress:
+    with shown_progress(*columns) as progress:
         task = progress.add_task("", total=len(plans))
         for plan, rows in finished(plans, share_out, stop):
             # A later run recognizes finished recordings by these keys.
@@ -411,7 +408,7 @@ def _identify(
                 if (error := row.get("error")) and reason_of(str(error)) not in shown:
                     shown.add(reason_of(str(error)))
                     label = ", ".join(filter(None, (plan.name, str(row["valve"]))))
-                    console.print(f"{label}: {error}")
+                    progress.console.print(f"{label}: {error}")
     return filings
 
 

@@ -13,17 +13,16 @@ import argparse
 import json
 import math
 import shlex
-import sys
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from valve_friction_ros.commands.arguments import require_outputs
 from valve_friction_ros.commands.arguments.planning import frictions_from, planned_settings
-from valve_friction_ros.commands.console import OutputConsole, plain_console
+from valve_friction_ros.commands.console import plain_console, shown_progress
 from valve_friction_ros.commands.process import ExitCode
 from valve_friction_ros.identification import SLIDING, UNITS, percentage, plain
 from valve_friction_ros.planning import (
@@ -242,15 +241,8 @@ def _planned(options: argparse.Namespace) -> StrokePlan:
         options.pressure_noise_pa,
         options.converter_lag,
     )
-    with Progress(
-        TextColumn("comparing stroke tests"),
-        BarColumn(),
-        TaskProgressColumn(),
-        TimeElapsedColumn(),
-        console=OutputConsole(stderr=True),
-        transient=True,
-        disable=not sys.stderr.isatty(),
-    ) as bar:
+    words = TextColumn("comparing stroke tests")
+    with shown_progress(words, BarColumn(), TaskProgressColumn(), TimeElapsedColumn()) as bar:
         task = bar.add_task("", total=1.0)
         return plan_test(
             described.valve,

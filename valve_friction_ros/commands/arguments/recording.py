@@ -170,9 +170,9 @@ def reading_progress() -> "Iterator[None]":
         return
     from rich.progress import Progress  # noqa: PLC0415 - slow to import
 
-    from valve_friction_ros.commands.console import OutputConsole  # noqa: PLC0415
+    from valve_friction_ros.commands.console import shown_progress  # noqa: PLC0415
 
-    with Progress(console=OutputConsole(stderr=True), transient=True) as progress:
+    with shown_progress(*Progress.get_default_columns()) as progress:
         task = progress.add_task("reading", total=1.0)
         token = PROGRESS.set(lambda share: progress.update(task, completed=share))
         try:
