@@ -43,7 +43,7 @@ from valve_friction_ros.planning.steps import (
     table_of,
 )
 from valve_friction_ros.records.files import write_whole
-from valve_friction_ros.records.units import LENGTH, PRESSURE, span
+from valve_friction_ros.records.units import POSITION_UNITS, PRESSURE_UNITS, span
 from valve_friction_ros.records.valve_file import read_valve_file
 from valve_friction_ros.wording import number_and_width
 
@@ -222,7 +222,7 @@ def _parameters(values: dict[str, Any]) -> str:
 
 def _units(options: argparse.Namespace) -> tuple[ShownUnit, ShownUnit]:
     """Return the units of pressure and position in output for people."""
-    sizes = PRESSURE[options.pressure_unit], LENGTH[options.position_unit]
+    sizes = PRESSURE_UNITS[options.pressure_unit], POSITION_UNITS[options.position_unit]
     pressure, position = (size.multiplier / size.divisor for size in sizes)
     return (
         ShownUnit(options.pressure_unit, pressure, FINEST_PRESSURE),
@@ -263,7 +263,7 @@ def run(options: argparse.Namespace) -> int:
             raise ValueError(f"{path}: it exists already: give another name, or --replace")
     require_outputs(*files, picture=options.figure)
     plan = _planned(options)
-    signal = span(options.signal_range, PRESSURE) if options.signal_range else None
+    signal = span(options.signal_range, PRESSURE_UNITS) if options.signal_range else None
     texts = {}
     if options.table is not None or options.form is not None:
         steps = set_points(plan, signal)

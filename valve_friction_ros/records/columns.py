@@ -21,7 +21,6 @@ from valve_friction_ros.records.units import (
     FORCE_UNITS,
     NANOSECONDS,
     POSITION_UNITS,
-    PRESSURE,
     PRESSURE_UNITS,
     SHARES,
     span,
@@ -127,7 +126,7 @@ class Columns:
                 f"opposing_area_ratio must be above 0 and at most 2, got {self.opposing_area_ratio}"
             )
         if self.pressure_range:
-            span(self.pressure_range, PRESSURE)
+            span(self.pressure_range, PRESSURE_UNITS)
         if not 0 <= self.maximum_bad_share < 1:
             raise ValueError(
                 f"maximum_bad_share must be from 0 to below 1, got {self.maximum_bad_share:g}"

@@ -30,7 +30,6 @@ from valve_friction_ros.records.table_rows import readable
 from valve_friction_ros.records.units import (
     FORCE_UNITS,
     POSITION_UNITS,
-    PRESSURE,
     PRESSURE_UNITS,
     SHARES,
     span,
@@ -66,7 +65,7 @@ def _pressure(read: ReadSignal, valve: Valve, form: Columns) -> NDArray[np.float
     unit = read.signal.unit
     if unit in SHARES:
         low, high = (
-            span(form.pressure_range, PRESSURE)
+            span(form.pressure_range, PRESSURE_UNITS)
             if form.pressure_range
             else (valve.pressure_minimum, valve.pressure_maximum)
         )

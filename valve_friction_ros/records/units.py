@@ -132,7 +132,6 @@ AREA: Mapping[str, Unit] = {
     "mm2": Unit(1, 1e6),
     "in2": Unit(6.4516, 1e4),
 }
-LENGTH, PRESSURE = POSITION_UNITS, PRESSURE_UNITS
 MASS: Mapping[str, Unit] = {"kg": Unit(1), "g": Unit(1, 1e3), "lb": Unit(0.45359237)}
 
 _KNOWN = (*NANOSECONDS, *POSITION_UNITS, *PRESSURE_UNITS, *FORCE_UNITS, *SHARES)
@@ -140,7 +139,7 @@ _BY_CASE = {name.casefold(): name for name in _KNOWN} | {
     name.casefold(): known for name, known in _OTHER_NAMES.items()
 }
 
-_EXAMPLES = ((AREA, "690 cm2"), (LENGTH, "28.6 mm"), (MASS, "1.6 kg"))
+_EXAMPLES = ((AREA, "690 cm2"), (POSITION_UNITS, "28.6 mm"), (MASS, "1.6 kg"))
 
 _NUMBER = r"([+-]?\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?)"
 _SINGLE = re.compile(rf"\s*{_NUMBER}\s*(\D.*?)?\s*", re.ASCII)
