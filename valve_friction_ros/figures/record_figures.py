@@ -185,8 +185,8 @@ def plan_figure(plan: StrokePlan) -> Figure:
         strict=True,
     ):
         record, _ = moved(test.excitation, test.duration, plan.valve, draw, plan.conditions)
-        share = 100 * record.position / travel
-        stem.plot(record.time, share, color=colour, label=f"friction {name}")
+        percent = 100 * record.position / travel
+        stem.plot(record.time, percent, color=colour, label=f"friction {name}")
     for share, label in ((plan.limits.lowest, "part of the travel"), (plan.limits.highest, None)):
         stem.axhline(100 * share, color="0.5", lw=0.8, ls="--", label=label)
     stem.set_ylabel("expected stem [% of travel]")

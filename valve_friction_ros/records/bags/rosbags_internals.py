@@ -9,7 +9,7 @@
 
 """Messages of a bag, and all uses of private names of rosbags.
 
-Checked with rosbags 0.11.9.
+Checked with rosbags 0.11.9; used are:
 
 - `McapReader`: the documented `Reader` infers the format of a file from its ending. It also refuses
   an MCAP file without index whose receive times go back, as those of several topics may.
