@@ -26,7 +26,7 @@ from valve_friction_ros.identification import (
     identify_bench,
     published_estimate,
 )
-from valve_friction_ros.model import BENCH_VALVE, LOW_FRICTION, Recording, simulate
+from valve_friction_ros.model import BENCH_VALVE, LOW_FRICTION
 from valve_friction_ros.wording import two_digits
 
 SETTINGS = IdentificationSettings(assumed_mass=1.6)  # of the valve file
@@ -328,15 +328,6 @@ def test_records(refusal, write_csv, columns_of, quick_record, bench_options, ch
     told = refusal(path, *bench_options, *how, "--plot", picture)
     assert told.startswith(f"{path}: {message}")
     assert not picture.exists()
-
-
-def test_sampled_too_slowly(refusal, write_csv, columns_of, benches, bench_options):
-    """Ten samples a second of a stem that crosses its range within one of them."""
-    pressure = np.where(np.arange(400) // 20 % 2, 160e3, 64e3)
-    position = simulate(*benches["low"], pressure, 0.1).position
-    path = write_csv(columns_of(Recording(0.1, pressure, position)))
-    message = refusal(path, *bench_options)
-    assert message.startswith(f"{path}: sampling is too slow for the motion: the stem moves ")
 
 
 def test_no_valve_file_for_a_pressure(refusal, quick_csv):

@@ -103,17 +103,6 @@ def test_the_page_holds_all_that_was_found(reported, quick_csv):
     assert page.table("record")["samples"] == ("1000, sampled every 10 ms",)
 
 
-def test_times_are_those_of_the_stated_zone(reported, write_csv, columns_of, quick_record):
-    columns = columns_of(quick_record)
-    columns["time_s"] = 1_784_282_400.0 + columns["time_s"]  # 2026-07-17 10:00 UTC
-    path = write_csv(columns)
-    os.utime(path, (1_784_286_000, 1_784_286_000))
-    page, _ = reported(path, "--method", "bench", "--time-zone", "Europe/Berlin")
-    assert page.table("record")["began"] == ("2026-07-17 12:00:00 Europe/Berlin",)
-    assert page.table("setting")["report written"][0].endswith(" Europe/Berlin")
-    assert any("last changed 2026-07-17 13:00 Europe/Berlin" in text for text in page.said("p"))
-
-
 def test_the_page_of_the_default_method(reported, write_csv, columns_of, quick_record):
     """A noisy record: the uncertainty budget of JSON, and nothing that speaks of another method."""
     noisy = SensorNoise(position=20e-6, pressure=150.0, seed=2).applied_to(quick_record)
@@ -165,18 +154,28 @@ def test_the_colour_of_the_status_is_that_of_the_diagnosis(reported, quick_csv, 
     assert page.table("friction")["diagnosis"] == (answer["diagnosis"]["message"],)
 
 
-def test_a_record_has_its_date_or_that_of_its_file(reported, write_csv, columns_of, quick_record):
+@pytest.mark.parametrize(
+    ("begin", "zone", "told"),
+    [
+        (0.0, "", "The record has no date; its file was last changed 2026-07-17 11:00 UTC."),
+        (
+            1_784_282_400.0,  # 2026-07-17 10:00 UTC
+            "Europe/Berlin",
+            "Recorded 2026-07-17 12:00 Europe/Berlin; its file was last changed 2026-07-17 13:00 "
+            "Europe/Berlin.",
+        ),
+    ],
+)
+def test_a_record_has_its_date_or_that_of_its_file(
+    reported, write_csv, columns_of, quick_record, begin, zone, told
+):
+    """In the stated zone."""
     columns = columns_of(quick_record)
-    path = write_csv(columns)
-    os.utime(path, (1.7e9, 1.7e9))
-    page, _ = reported(path, "--method", "bench")
-    changed = "its file was last changed 2023-11-14 22:13 UTC."
-    assert f"The record has no date; {changed}" in page.said("p")
-    dated = write_csv({**columns, "time_s": 1.76e9 + np.asarray(columns["time_s"])})
-    os.utime(dated, (1.7e9, 1.7e9))
-    page, _ = reported(dated, "--method", "bench")
-    assert f"Recorded 2025-10-09 08:53 UTC; {changed}" in page.said("p")
-    assert page.table("setting")["report written"][0].endswith(" UTC")
+    path = write_csv({**columns, "time_s": begin + columns["time_s"]})
+    os.utime(path, (1_784_286_000, 1_784_286_000))
+    page, _ = reported(path, "--method", "bench", *(["--time-zone", zone] if zone else []))
+    assert told in page.said("p")
+    assert page.table("setting")["report written"][0].endswith(f" {zone or 'UTC'}")
 
 
 def test_why_published_values_differ_is_told_beside_them(reported, quick_csv):

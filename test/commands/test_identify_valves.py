@@ -324,18 +324,6 @@ class TestOneValve:
         assert answer(bag) == csv_answer
         assert answer(storage_file(bag)) == csv_answer
 
-    def test_a_cut_bag_is_identified_with_a_note(self, answer, call, bag):
-        file = storage_file(bag)
-        file.write_bytes(file.read_bytes()[:-3000])
-        found = answer(bag)
-        assert found["parameters"]["coulomb_friction"]["value"] == pytest.approx(152.7, rel=0.01)
-        assert found["warnings"][0] == (
-            "bag.mcap is truncated or damaged (File end magic is invalid): it was read as far "
-            "as possible"
-        )
-        _, out, _ = call(bag)
-        assert "note: bag.mcap is truncated or damaged" in out
-
     def test_a_refusal_tells_of_the_damage(self, call, tmp_path, quick_record):
         bag = write_bag(tmp_path / "bag", messages_of(quick_record), "sqlite3")
         file = storage_file(bag)
