@@ -54,12 +54,10 @@ _MOST_SAMPLES = 12_000
 
 @dataclass(frozen=True)
 class Forecast:
-    """Forecast for one valve: its motion, and the intervals of its parameters.
+    """Forecast for the valve with these `parameters`: its motion, and the intervals.
 
     Attributes
     ----------
-    parameters : KarnoppParameters
-        The valve.
     values, half_widths : mapping of str to float
         True values, and half the widths of their 95 % intervals; SI units. No widths if refused.
     reach : tuple of float
@@ -169,24 +167,14 @@ _REFUSAL_LOSS = 3.0
 
 @dataclass(frozen=True)
 class StrokePlan:
-    """A stroke test with its forecasts.
+    """A stroke test with its forecasts, and what it was planned for.
 
     Attributes
     ----------
-    test : StrokeTest
-        The pressure.
-    valve : Valve
-        Geometry.
     band : PressureBand
         Pressures between which it moves.
-    frictions : FrictionRange
-        The valves for which it is planned.
     forecasts : tuple of Forecast
-        Forecast for each valve.
-    limits : Limits
-        Limits that it keeps to.
-    conditions : Conditions
-        Conditions of its measurement.
+        Forecast for each valve of `frictions`.
     aim : str
         Its aim, one of `AIMS`.
     tried : int

@@ -29,17 +29,7 @@ _QUICK = 0.9
 
 
 class ShownUnit(NamedTuple):
-    """A unit of set points and limits.
-
-    Attributes
-    ----------
-    name : str
-        Name, such as ``psi``.
-    size : float
-        Size in SI.
-    finest : float
-        Resolution to which a value is shown, in SI.
-    """
+    """A unit of set points and limits: its size, and the resolution of shown values, both in SI."""
 
     name: str
     size: float
@@ -69,15 +59,13 @@ class SetPoint:
     ----------
     time, duration : float
         Beginning and length, s.
-    pressure : float
-        Pressure at its end, Pa.
-    share : float
-        `pressure` as a share of the signal's range.
+    pressure, share : float
+        Pressure at its end, Pa, and the same as a share of the signal's range.
     stem : tuple of float
         Shares of the travel between which the stem must be from then on until the next step ends:
         beyond them the test is aborted.
     tells : str
-        Purpose of the step.
+        Purpose.
     """
 
     time: float

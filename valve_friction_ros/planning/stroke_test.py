@@ -323,12 +323,8 @@ class StrokeTest:
 
     Attributes
     ----------
-    times : ndarray of float, shape (n,)
-        Since the start, s.
-    pressures : ndarray of float, shape (n,)
-        Pressure at these times, Pa.
-    pattern : Pattern
-        Its pattern.
+    times, pressures : ndarray of float, shape (n,)
+        Times of the corners since the start, s, and the pressures there, Pa.
     cycles : int
         Number of times that the stem goes up and down again.
     """

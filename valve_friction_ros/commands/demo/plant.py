@@ -37,16 +37,9 @@ _ANSWER_TIMEOUT = 120.0
 
 
 class PlantValve(NamedTuple):
-    """A valve of the plant, and the change of its packing.
+    """A valve in the namespace `name`, and the change of its packing, its `fate` in a word.
 
-    Attributes
-    ----------
-    name : str
-        Namespace of the valve.
-    fate : str
-        The change, in a word.
-    growth, end : float
-        Factor of friction from one identification to the next, and after all of them.
+    `growth` is the factor of friction from one identification to the next, `end` that after all.
     """
 
     name: str
