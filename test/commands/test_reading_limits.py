@@ -83,9 +83,7 @@ class TestTables:
         limit = ("--maximum-megabytes", "20") if b"remark" in piece else ()
         assert cause in bounded(path, *limit)
 
-    def test_most_rows_of_which_a_part_needs_room_for_itself_only(
-        self, refusal, tmp_path, bench_options
-    ):
+    def test_a_part_needs_room_for_itself_only(self, refusal, tmp_path, bench_options):
         """Beyond the end nothing is read: the bad row there is not met."""
         path = tmp_path / "a.csv"
         rows = b"".join(b"%d.0,0,1e5\n" % index for index in range(60_000))
