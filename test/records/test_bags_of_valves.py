@@ -62,19 +62,35 @@ def test_one_of_each_is_a_valve_wherever_they_are(pressure, stem, name):
     assert found([pressure], [stem]) == [(name, pressure, stem)]
 
 
-def test_one_of_each_in_a_namespace():
-    assert found(["/b/p", "/a/p"], ["/a/x", "/b/y"]) == [
-        ("/a", "/a/p", "/a/x"),
-        ("/b", "/b/p", "/b/y"),
-    ]
-
-
-def test_the_names_of_this_package_go_first():
-    pressures = ["/a/supply", "/a/actuator_pressure", "/b/actuator_pressure"]
-    assert found(pressures, ["/a/stem_state", "/a/arm", "/b/stem_state"]) == [
-        ("/a", "/a/actuator_pressure", "/a/stem_state"),
-        ("/b", "/b/actuator_pressure", "/b/stem_state"),
-    ]
+@pytest.mark.parametrize(
+    ("pressures", "stems", "choice", "valves"),
+    [
+        ("/b/p /a/p", "/a/x /b/y", {}, ["/a /a/p /a/x", "/b /b/p /b/y"]),
+        (
+            "/a/supply /a/actuator_pressure /b/actuator_pressure",
+            "/a/stem_state /a/arm /b/stem_state",
+            {},
+            ["/a /a/actuator_pressure /a/stem_state", "/b /b/actuator_pressure /b/stem_state"],
+        ),
+        (
+            "/a/p /b/actuator_pressure /weather/air",
+            "/a/x /arm/joint_states",
+            {},
+            ["/a /a/p /a/x", "/b /b/actuator_pressure None"],
+        ),
+        (
+            "/a/io/p /a/p /b/io/p",
+            "/a/x /b/x",
+            {"pressure": "io/p"},
+            ["/a /a/io/p /a/x", "/b /b/io/p /b/x"],
+        ),
+        ("/a/p /b/p", "/joint_states", {"pressure": "/b/p"}, ["/ /b/p /joint_states"]),
+    ],
+    ids=["one of each", "own names first", "half a valve by its name", "within each", "a choice"],
+)
+def test_the_valves_of_a_bag(pressures, stems, choice, valves):
+    told = found(pressures.split(), stems.split(), **choice)
+    assert [" ".join(map(str, valve)) for valve in told] == valves
 
 
 @pytest.mark.parametrize(
@@ -90,28 +106,9 @@ def test_several_are_named_and_not_guessed_among(pressures, stems, option):
         found(pressures, stems)
 
 
-def test_half_a_valve_is_told_by_its_name():
-    assert found(
-        ["/a/p", "/b/actuator_pressure", "/weather/air"], ["/a/x", "/arm/joint_states"]
-    ) == [
-        ("/a", "/a/p", "/a/x"),
-        ("/b", "/b/actuator_pressure", None),
-    ]
-
-
 def test_no_pair_at_all():
     with pytest.raises(ValueError, match="no namespace holds both a pressure and a stem, of /a/p"):
         found(["/a/p", "/b/p"], ["/joint_states"])
-    chosen = found(["/a/p", "/b/p"], ["/joint_states"], pressure="/b/p")
-    assert chosen == [("/", "/b/p", "/joint_states")]
-
-
-def test_names_within_each_namespace():
-    pressures = ["/a/io/p", "/a/p", "/b/io/p"]
-    assert found(pressures, ["/a/x", "/b/x"], pressure="io/p") == [
-        ("/a", "/a/io/p", "/a/x"),
-        ("/b", "/b/io/p", "/b/x"),
-    ]
 
 
 def test_many_topics_are_not_all_listed():
@@ -182,13 +179,8 @@ def test_nothing_is_overwritten(tmp_path, buffer):
     for bag in bags:
         (valve,) = read_recordings(bag, BENCH_VALVE)
         assert len(valve.recording()) == len(buffer.snapshot().recording())
-    assert {path.name for path in tmp_path.iterdir()} == {
-        "new",
-        "fv_101",
-        "fv_101_2",
-        "fv_101_3",
-        "fv_101_4",
-    }
+    assert (tmp_path / "fv_101_3").read_text() == "mine"
+    assert len([*tmp_path.iterdir()]) == 5  # nothing else is left
 
 
 def test_rejected_samples_are_told(tmp_path, buffer):
