@@ -213,18 +213,12 @@ def test_a_new_file_and_one_in_its_place(tmp_path):
 
 
 @pytest.mark.usefixtures("full_disk")
-def test_no_part_of_it_stays(tmp_path):
+def test_no_part_of_it_stays_and_what_was_there_does(tmp_path):
     path = tmp_path / "picture.png"
     with pytest.raises(OSError, match="No space left") as raised:
         write_whole(path, b"content")
     assert raised.value.filename == str(path)
     assert names(tmp_path) == set()
-
-
-@pytest.mark.usefixtures("full_disk")
-def test_what_was_there_stays(tmp_path):
-    path = tmp_path / "picture.png"
-    path.touch()
     with path.open("wb") as stream:
         stream.write(b"before")
     with pytest.raises(OSError, match="No space left"):
