@@ -17,21 +17,11 @@ from dataclasses import dataclass, field, fields
 from typing import Any
 
 from valve_friction_ros.outside_text import nearest
-from valve_friction_ros.records.units import (
-    FORCE_UNITS,
-    NANOSECONDS,
-    POSITION_UNITS,
-    PRESSURE_UNITS,
-    SHARES,
-    span,
-    unit_named,
-)
+from valve_friction_ros.records.units import PRESSURE_UNITS, SHARES, UNITS, span, unit_named
 
 KNOWN_UNITS: Mapping[str, tuple[str, ...]] = {
-    "time": (*NANOSECONDS,),
-    "position": (*POSITION_UNITS, *SHARES),
-    "pressure": (*PRESSURE_UNITS, *SHARES),
-    "force": (*FORCE_UNITS,),
+    quantity: (*units, *(SHARES if quantity in ("position", "pressure") else ()))
+    for quantity, units in UNITS.items()
 }
 """Names of the permitted units by quantity."""
 
