@@ -29,9 +29,6 @@ from valve_friction_ros.model.valve import KarnoppParameters, Valve
 from valve_friction_ros.records.recordings import ReadingOptions, read_recordings
 from valve_friction_ros.streams.samples import Samples, uniform_recording
 
-_ANY_SENSOR = Valve()
-"""The default valve, without sensor ranges and without stops."""
-
 
 def read_recording(
     source: str | PathLike[str] | Mapping[str, Any],
@@ -81,16 +78,14 @@ def read_recording(
     """
     if not isinstance(source, (str, PathLike)):
         return _from_columns(source)
-    recorded = read_recordings(Path(source), valve or _ANY_SENSOR, options)
-    names = [each.name for each in recorded]
+    recorded = read_recordings(Path(source), valve or Valve(), options)
+    names = ", ".join(each.name for each in recorded)
     if name is None and len(recorded) > 1:
-        raise ValueError(f"{source}: several valves ({', '.join(names)}): choose one by name=")
-    if name is None:
-        return recorded[0].recording()
+        raise ValueError(f"{source}: several valves ({names}): choose one by name=")
     for each in recorded:
-        if each.name.strip("/") == name.strip("/"):
+        if name is None or each.name.strip("/") == name.strip("/"):
             return each.recording()
-    raise ValueError(f"{source}: no valve is named {name!r}; choose from {', '.join(names)}")
+    raise ValueError(f"{source}: no valve is named {name!r}; choose from {names}")
 
 
 def _column(columns: Mapping[str, Any], name: str) -> NDArray[np.float64]:
@@ -177,9 +172,9 @@ def simulate(
     >>> round(1e3 * float(stem.position[-1]), 1)
     20.9
     """
-    if not isinstance(parameters, Result):
-        return simulated(valve, parameters, drive, sample_period, start)
-    return simulated(valve, parameters.simulated_model(), drive, sample_period, start)
+    if isinstance(parameters, Result):
+        parameters = parameters.simulated_model()
+    return simulated(valve, parameters, drive, sample_period, start)
 
 
 def compare(

@@ -20,8 +20,9 @@ from numpy.typing import NDArray
 
 from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.model import Recording, Valve
+from valve_friction_ros.records.bags.topics import TopicChoice
 from valve_friction_ros.records.columns import Columns
-from valve_friction_ros.records.recordings import read_table
+from valve_friction_ros.records.recordings import ReadingOptions, read_recordings
 
 STEP = 1e-3
 DURATION = 40.0
@@ -127,9 +128,9 @@ def read(export: Export, truth: Truth, folder: Path) -> Outcome:
     message = ""
     for _ in range(2):
         try:
-            (recorded,) = read_table(
-                path, valve, replace(form, **given), name=str(name) if name else None
-            )
+            topics = TopicChoice(valve=str(name) if name else None)
+            options = ReadingOptions(replace(form, **given), topics)
+            (recorded,) = read_recordings(path, valve, options)
             recording = recorded.recording()
         except (ValueError, RefusalError) as error:
             message = str(error)

@@ -17,12 +17,12 @@ import rclpy
 
 from valve_friction_ros.commands.demo.bench import (
     BenchClient,
-    BenchError,
     NodeProcess,
     quick_discovery,
     running_nodes,
 )
 from valve_friction_ros.health import Level
+from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.model import BENCH_VALVE
 from valve_friction_ros.streams import RecordBuffer
 
@@ -32,29 +32,27 @@ NODES = [NodeProcess("identifier", {"input_timeout": 0.5}), NodeProcess("simulat
 def error_of(call, *arguments):
     try:
         call(*arguments)
-    except BenchError as error:
+    except RefusalError as error:
         return str(error)
     return None
 
 
 def visit(client):
     """Call everything that must fail while no pressure is published."""
+
+    def set_parameters(values):
+        return error_of(client.set_parameters, "/fv_7/simulator", values, 10.0)
+
     seen = {
-        "before": [client.recorded, client.level, client.diagnostic_message],
+        "before": [client.recorded, client.status, client.diagnostic_values],
         "identify": error_of(client.trigger, "identify"),
         "clear": client.trigger("clear"),
-        "impossible": error_of(client.set_parameters, "simulator", {"coulomb_friction": 1e6}),
-        "possible": error_of(
-            client.set_parameters,
-            "simulator",
-            {"coulomb_friction": 700.0, "static_friction": 800.0},
-        ),
-        "absent node": error_of(client.set_parameters, "nobody", {"mass": 1.0}, 0.1),
-        "absent service": error_of(client.trigger, "dance", 0.1),
+        "impossible": set_parameters({"coulomb_friction": 1e6}),
+        "possible": set_parameters({"coulomb_friction": 700.0, "static_friction": 800.0}),
     }
-    client.wait(lambda: client.level == Level.WARN, 30.0, "warning")
+    client.wait(lambda: client.status and client.status.level[0] == Level.WARN, 30.0, "warning")
     return seen | {
-        "message": client.diagnostic_message,
+        "message": client.status.message,
         "estimate_valid": client.diagnostic_values["estimate_valid"],
     }
 
@@ -63,11 +61,13 @@ if __name__ == "__main__":
     os.environ.update(quick_discovery())
     with running_nodes(NODES, "fv_7") as processes:
         rclpy.init(args=[])
-        client = BenchClient("fv_7", RecordBuffer(BENCH_VALVE, 1.0))
+        node = rclpy.create_node("demo", namespace="fv_7")
+        client = BenchClient(node, "fv_7", RecordBuffer(BENCH_VALVE, 1.0))
         try:
             answers = visit(client)
         finally:
             client.close()
+            node.destroy_node()
             rclpy.try_shutdown()
     answers["exit codes"] = [process.returncode for process in processes]
     json.dump(answers, sys.stdout)

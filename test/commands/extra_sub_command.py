@@ -19,10 +19,7 @@ import time
 
 from valve_friction_ros.commands import main
 from valve_friction_ros.commands.arguments import declared
-
-
-class RefusedError(Exception):
-    """A refusal of its own kind."""
+from valve_friction_ros.identification import RefusalError
 
 
 class Interrupting:
@@ -30,9 +27,6 @@ class Interrupting:
 
     def __del__(self):
         os.kill(os.getpid(), signal.SIGINT)
-
-
-REFUSALS = (RefusedError,)
 
 
 def declare(parser):
@@ -54,7 +48,7 @@ def run(options):
     if options.ending == "swallowed":
         import swallowing_module  # noqa: F401
     if options.ending == "own refusal":
-        raise RefusedError("not this\none")
+        raise RefusalError("not this\none")
     if options.ending == "refusal":
         raise ValueError("not that one")
     if options.ending == "no file":

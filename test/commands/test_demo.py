@@ -13,7 +13,6 @@ import contextlib
 import io
 import json
 import math
-import os
 import re
 import signal
 import subprocess
@@ -28,7 +27,6 @@ from waiting import wait_until
 from valve_friction_ros.commands.demo import command as demo
 from valve_friction_ros.commands.demo import plant
 from valve_friction_ros.commands.demo.bench import (
-    BenchError,
     NodeProcess,
     quick_discovery,
     running_nodes,
@@ -40,6 +38,7 @@ from valve_friction_ros.identification import (
     UNITS,
     IdentificationSettings,
     Parameter,
+    RefusalError,
     Verdict,
     identify_bench,
 )
@@ -48,14 +47,6 @@ from valve_friction_ros.nodes.plumbing.rclpy_private import PROFILES
 from valve_friction_ros.settings import KARNOPP
 
 PNG = b"\x89PNG\r\n\x1a\n"
-ASKED = {
-    "viscous_friction": 0.02,
-    "coulomb_friction": 0.01,
-    "spring_constant": 0.002,
-    "mass": 0.1,
-}
-
-
 HALF_WIDTH = 0.01  # of the value
 
 
@@ -89,7 +80,8 @@ def outcome(case):
 
 
 def test_tolerances_are_what_was_promised():
-    assert {name: TOLERANCES[name] for name in ASKED} == ASKED
+    names = ("viscous_friction", "coulomb_friction", "spring_constant", "mass")
+    assert [TOLERANCES[name] for name in names] == [0.02, 0.01, 0.002, 0.1]
 
 
 class TestMissed:
@@ -130,8 +122,8 @@ class TestReport:
         def report(outcomes, level):
             output = tmp_path / "[b]demo.png"  # not to be taken for bold
             stream = io.StringIO()
-            story = demo._Story(outcomes, level, "excess friction")
-            code = demo._report(story, output, Console(file=stream, width=200))
+            console = Console(file=stream, width=200)
+            code = demo._report(outcomes, level, "excess friction", output, console)
             words = stream.getvalue()
             assert f"picture: {output}" in words
             assert output.read_bytes().startswith(PNG)
@@ -160,12 +152,10 @@ class TestReport:
         )
         assert "nan" not in words
 
-    def test_a_missed_tolerance(self, report, outcome):
+    def test_a_missed_tolerance_and_a_friction_that_was_not_diagnosed(self, report, outcome):
         code, words = report([outcome(), outcome("tight", mass=-0.2)], Level.ERROR)
         assert code == 1
         assert "outside the tolerance: mass (tight)" in words
-
-    def test_friction_that_was_not_diagnosed(self, report, outcome):
         code, words = report([outcome(), outcome("tight")], Level.WARN)
         assert code == 1
         assert "/diagnostics WARN: excess friction" in words
@@ -240,31 +230,24 @@ class TestIdentify:
     def test_no_published_estimate_is_a_failure_with_its_reason(self, quick_record, values):
         withheld = {name: value for name, value in values.items() if "published" not in name}
         del withheld["threshold [m/s]"]
-        with pytest.raises(BenchError, match=r"^no published estimate: check the clocks$"):
+        with pytest.raises(RefusalError, match=r"^no published estimate: check the clocks$"):
             identified(FakeClient(quick_record, withheld), "loose", LOW_FRICTION)
 
 
-class TestOptions:
-    def test_a_bad_picture_is_refused_before_the_nodes_start(self, monkeypatch, command, tmp_path):
-        monkeypatch.setattr(demo, "running_nodes", pytest.fail)
-        path = tmp_path / "no" / "demo.png"
-        code, out, err = command("demo", "--output", path)
-        assert (code, out) == (2, "")
-        assert err.startswith(f"valve_friction demo: {path}: there is no folder")
-        assert err.count("\n") == 1
+def test_a_bad_picture_is_refused_before_the_nodes_start(monkeypatch, refused, tmp_path):
+    monkeypatch.setattr(demo, "running_nodes", pytest.fail)
+    path = tmp_path / "no" / "demo.png"
+    assert refused("demo", "--output", path).startswith(f"{path}: there is no folder")
 
 
 def test_nodes_start_as_the_bench_valve():
+    """With noise: a demo without it would prove nothing."""
     nodes = {node.executable: node.parameters for node in demo._nodes()}
     assert set(nodes) == {"identifier", "simulator", "pressure_source"}
     assert not {one.name for one in KARNOPP} & nodes["simulator"].keys()
     assert all(getattr(LOW_FRICTION, one.name) == one.default for one in KARNOPP)
     bias = LOW_FRICTION.spring_preload / LOW_FRICTION.spring_constant
     assert nodes["identifier"]["position_bias"] == bias
-
-
-def test_a_demo_without_noise_would_prove_nothing():
-    nodes = {node.executable: node.parameters for node in demo._nodes()}
     assert nodes["simulator"]["position_noise"] >= 3e-6
     assert nodes["pressure_source"]["pressure_noise"] > 0
     assert nodes["pressure_source"]["time_jitter"] > 0
@@ -291,14 +274,12 @@ class TestPlant:
         ]
         assert len(set(seeds)) == len(seeds) == 6
 
-    def test_without_nicegui_it_says_so_in_one_line(self, command, monkeypatch):
+    def test_without_nicegui_it_says_so_in_one_line(self, refused, monkeypatch):
         monkeypatch.setitem(sys.modules, "nicegui", None)
         monkeypatch.setattr(plant.importlib.util, "find_spec", lambda _: None)
         monkeypatch.setattr(demo, "free_domain", pytest.fail)
-        code, out, err = command("demo", "--dashboard")
-        assert (code, out) == (2, "")
-        assert err.startswith("valve_friction demo: the dashboard needs NiceGUI: run `pip install")
-        assert err.count("\n") == 1
+        told = refused("demo", "--dashboard")
+        assert told.startswith("the dashboard needs NiceGUI: run `pip install")
 
 
 def children(pid):
@@ -368,9 +349,6 @@ def test_the_whole_story(ros_environment, tmp_path):
     assert output.read_bytes().startswith(PNG)
 
 
-NAMES = ("ROS_AUTOMATIC_DISCOVERY_RANGE", PROFILES)
-
-
 def test_what_a_client_is_told(ros_environment):
     """Two nodes and a client as processes: every failure has its reason, and all end well."""
     done = subprocess.run(
@@ -384,40 +362,29 @@ def test_what_a_client_is_told(ros_environment):
     assert done.returncode == 0, done.stderr
     assert "Traceback" not in done.stderr
     told = json.loads(done.stdout)
-    assert told["before"] == [0.0, None, ""]
+    assert told["before"] == [0.0, None, {}]
     assert told["identify"].startswith("identify: no ")
     assert "actuator_pressure" in told["identify"]
     assert told["clear"]
-    assert told["impossible"].startswith("simulator refused: ")
+    assert told["impossible"].startswith("/fv_7/simulator refused: ")
     assert "static_friction" in told["impossible"]
     assert told["possible"] is None
-    assert told["absent node"] == (
-        "no answer of /fv_7/nobody/set_parameters_atomically within 0.1 s"
-    )
-    assert told["absent service"] == (
-        "/fv_7/identifier/dance is not available: start the identifier of this valve"
-    )
     assert "actuator_pressure" in told["message"]
     assert told["estimate_valid"] == "false"
     assert told["exit codes"] == [0, 0]
 
 
-class TestQuickDiscovery:
-    def test_stays_on_this_machine(self, monkeypatch):
-        for name in NAMES:
-            monkeypatch.delenv(name, raising=False)
-        found = quick_discovery()
-        assert set(found) == set(NAMES)
-        assert found["ROS_AUTOMATIC_DISCOVERY_RANGE"] == "LOCALHOST"
-        assert Path(found[PROFILES]).is_file()
-
-    @pytest.mark.parametrize("name", NAMES)
-    def test_what_the_user_has_set_stays(self, monkeypatch, name):
-        for other in NAMES:
-            monkeypatch.delenv(other, raising=False)
-        monkeypatch.setenv(name, "of the user")
-        assert set(quick_discovery()) == set(NAMES) - {name}
-        assert os.environ[name] == "of the user"
+@pytest.mark.parametrize("given", [None, "ROS_AUTOMATIC_DISCOVERY_RANGE", PROFILES])
+def test_discovery_stays_on_this_machine_and_what_the_user_has_set_stays(monkeypatch, given):
+    names = {"ROS_AUTOMATIC_DISCOVERY_RANGE", PROFILES}
+    for name in names:
+        monkeypatch.delenv(name, raising=False)
+    if given:
+        monkeypatch.setenv(given, "of the user")
+    found = quick_discovery()
+    assert set(found) == names - {given}
+    assert found.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST") == "LOCALHOST"
+    assert Path(found.get(PROFILES, __file__)).is_file()
 
 
 def test_processes_end_with_the_context_even_after_an_error():

@@ -9,7 +9,6 @@
 
 """The sub-command `identify-folder` on folders in object stores."""
 
-import csv
 import logging
 import shutil
 import sys
@@ -18,6 +17,7 @@ import numpy as np
 import pytest
 from bags import messages_of, write_bag
 from documentation import PROJECT
+from kept_rows import rows_of
 
 from valve_friction_ros.commands import identify_folder
 from valve_friction_ros.fleet import find_recordings
@@ -59,11 +59,8 @@ def server():
     found.start()
     host, port = found.get_host_and_port()
     with pytest.MonkeyPatch.context() as patch:
-        for name, value in (
-            ("KEY", "key"),
-            ("SECRET", "secret"),
-            ("ENDPOINT_URL", f"http://{host}:{port}"),
-        ):
+        address = f"http://{host}:{port}"
+        for name, value in (("KEY", "key"), ("SECRET", "secret"), ("ENDPOINT_URL", address)):
             patch.setenv(f"FSSPEC_S3_{name}", value)
         patch.setattr(fsspec.config, "conf", {})
         fsspec.config.set_conf_env(fsspec.config.conf)
@@ -87,12 +84,6 @@ def arguments(stored, tmp_path):
     return ("identify-folder", stored, *options)
 
 
-def rows_of(path):
-    with path.open(newline="") as stream:
-        rows = {row["recording"]: row for row in csv.DictReader(stream)}
-    return {name: {**row, "content": None} for name, row in rows.items()}
-
-
 def test_the_rows_of_the_folder_on_disk(arguments, stored, folder, tmp_path, command):
     """Also with its valve files, a bag, and a force that needs none; then only what changed."""
     code, out, err = command(*arguments)
@@ -100,8 +91,9 @@ def test_the_rows_of_the_folder_on_disk(arguments, stored, folder, tmp_path, com
     here = tmp_path / "here.csv"
     local = command("identify-folder", folder, "--output", here, *arguments[4:])
     assert local == (code, *(text.replace(stored, str(folder)) for text in (out, err)))
-    rows = rows_of(arguments[3])
-    assert rows == rows_of(here)
+    rows, of_disk = rows_of(arguments[3]), rows_of(here)
+    assert all(row.pop("content") for row in (*rows.values(), *of_disk.values()))
+    assert rows == of_disk
     assert rows.keys() == {"bag", "broken.csv", "force.csv", "unit 1/a#1.csv"}
     assert {name for name, row in rows.items() if row["error"]} == {"broken.csv"}
     assert "skipped, no recordings: .hidden.csv, notes.txt" in err
@@ -134,29 +126,22 @@ def test_an_object_that_cannot_be_read_is_a_row(arguments, command, monkeypatch)
         ("odd://plants/north", "odd://plants/north: no such store: "),
     ],
 )
-def test_no_such_folder(arguments, command, name, message):
-    code, out, err = command("identify-folder", name, *arguments[2:])
-    assert (code, out) == (2, "")
-    (line,) = err.splitlines()
-    assert line.startswith(f"valve_friction identify-folder: {message}")
+def test_no_such_folder(arguments, refused, name, message):
+    assert refused("identify-folder", name, *arguments[2:]).startswith(message)
     assert not arguments[3].exists()
 
 
-def test_one_line_names_the_extra(arguments, command, monkeypatch):
+def test_one_line_names_the_extra(arguments, refused, monkeypatch):
     monkeypatch.setitem(sys.modules, "upath", None)
-    code, _, err = command(*arguments)
-    assert code == 2
-    (line,) = err.splitlines()
+    line = refused(*arguments)
     assert "S3 needs `pip install s3fs 'universal_pathlib>=0.3.10,<0.4'` (the extra `st" in line
 
 
-def test_a_server_that_is_away(arguments, command, monkeypatch):
+def test_a_server_that_is_away(arguments, refused, monkeypatch):
     settings = {"s3": {"key": "k", "secret": "s", "endpoint_url": "http://127.0.0.1:9"}}
     monkeypatch.setattr(fsspec.config, "conf", settings)
-    code, _, err = command("identify-folder", "s3://elsewhere/north", *arguments[2:])
-    assert code == 2
-    (line,) = err.splitlines()
-    assert "s3://elsewhere/north: " in line
+    told = refused("identify-folder", "s3://elsewhere/north", *arguments[2:])
+    assert "s3://elsewhere/north: " in told
 
 
 def test_other_stores_by_their_names():

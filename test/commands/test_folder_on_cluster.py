@@ -9,7 +9,6 @@
 
 """The sub-command `identify-folder` on the workers of a Dask cluster."""
 
-import csv
 import os
 import shutil
 import signal
@@ -20,7 +19,7 @@ from pathlib import Path
 import pytest
 from dask_workers import identify, local_cluster
 from documentation import PROJECT
-from kept_rows import kept
+from kept_rows import kept, rows_of
 from local_server import certificate_pair
 from waiting import PATIENCE, wait_until
 
@@ -51,11 +50,6 @@ def folder(tmp_path):
 @pytest.fixture
 def arguments(folder, tmp_path):
     return (folder, "--output", tmp_path / "friction.csv", "--method", "bench")
-
-
-def rows_of(path):
-    with path.open(newline="") as stream:
-        return {row["recording"]: row for row in csv.DictReader(stream)}
 
 
 def test_the_rows_and_reports_of_the_local_run(address, tmp_path, command, monkeypatch):
@@ -137,7 +131,7 @@ def test_what_a_worker_does_not_see(address, folder, arguments, command, monkeyp
     assert "give all workers the folder under this path" in err
 
 
-def test_a_worker_without_the_package(folder, arguments, command, tmp_path):
+def test_a_worker_without_the_package(folder, arguments, refused, tmp_path):
     (folder / "a.csv").write_text(SHORT)
     (tmp_path / "missing").mkdir()
     (tmp_path / "missing" / "valve_friction_ros.py").write_text(
@@ -151,20 +145,18 @@ def test_a_worker_without_the_package(folder, arguments, command, tmp_path):
             stderr=subprocess.DEVNULL,
         )
         try:
-            code, out, err = command(
-                "identify-folder", *arguments, "--scheduler", empty.scheduler_address
-            )
+            line = refused("identify-folder", *arguments, "--scheduler", empty.scheduler_address)
         finally:
             worker.terminate()
             worker.wait(PATIENCE)
-    assert (code, out) == (2, "")
-    (line,) = err.splitlines()
     assert "a worker is unlike this machine (tcp://" in line
     assert "No module named 'valve_friction_ros'): install valve_friction_ros " in line
     assert not arguments[2].exists()
 
 
-def test_certificates_of_dask_configuration(folder, arguments, command, tmp_path, monkeypatch):
+def test_certificates_of_dask_configuration(
+    folder, arguments, command, refused, tmp_path, monkeypatch
+):
     (folder / "a.csv").write_text(SHORT)
     certificate, key = map(str, certificate_pair(tmp_path))
     parts = {f"tls_{part}_{what}": value for part in ("scheduler", "worker", "client")
@@ -175,10 +167,8 @@ def test_certificates_of_dask_configuration(folder, arguments, command, tmp_path
         address = secure.scheduler_address
         assert address.startswith("tls://")
         for other in (address, address.replace("tls://", "tcp://")):
-            code, _, err = command("identify-folder", *arguments, "--scheduler", other)
-            assert code == 2
-            (line,) = err.splitlines()
-            assert f"{other}: no scheduler answers: " in line
+            told = refused("identify-folder", *arguments, "--scheduler", other)
+            assert f"{other}: no scheduler answers: " in told
         tls = "distributed.comm.tls"
         settings = {f"{tls}.ca-file": certificate,
                     f"{tls}.client.cert": certificate, f"{tls}.client.key": key}  # fmt: skip
@@ -187,23 +177,14 @@ def test_certificates_of_dask_configuration(folder, arguments, command, tmp_path
         assert code == 0, err
 
 
-def test_refused_at_once(arguments, command, monkeypatch):
+def test_refused_at_once(arguments, refused, monkeypatch):
     monkeypatch.setattr(workers, "_AWAY", 0.5)
-    for words, message in (
-        (("--scheduler", "tcp://127.0.0.1:9"), "tcp://127.0.0.1:9: no scheduler answers: "),
-        (
-            ("--scheduler", "tcp://127.0.0.1:9", "--jobs", "2"),
-            "--jobs applies to this machine only: ",
-        ),
-    ):
-        code, out, err = command("identify-folder", *arguments, *words)
-        assert (code, out) == (2, "")
-        (line,) = err.splitlines()
-        assert line.startswith(f"valve_friction identify-folder: {message}")
+    away = ("identify-folder", *arguments, "--scheduler", "tcp://127.0.0.1:9")
+    assert refused(*away).startswith("tcp://127.0.0.1:9: no scheduler answers: ")
+    assert refused(*away, "--jobs", "2").startswith("--jobs applies to this machine only: ")
     monkeypatch.setitem(sys.modules, "distributed", None)
-    code, out, err = command("identify-folder", *arguments, "--scheduler", "tcp://127.0.0.1:9")
-    assert code == 2
-    assert "run `pip install 'distributed>=2026.8'` (the extra `cluster`)" in err
+    told = "run `pip install 'distributed>=2026.8'` (the extra `cluster`)"
+    assert told in refused(*away)
     assert not arguments[2].exists()
 
 

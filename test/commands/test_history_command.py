@@ -43,8 +43,8 @@ def file(tmp_path_factory):
     return history.path
 
 
-def told(run, *arguments):
-    code, output, errors = run("--json", *arguments)
+def told(run, *arguments, **path):
+    code, output, errors = run("--json", *arguments, **path)
     assert (code, errors) == (0, "")
     return json.loads(output)["valves"]
 
@@ -75,10 +75,9 @@ class TestTable:
             "no significant drift of coulomb friction over 5 days with records, 2026-09" in output
         )
         assert "month" not in output
-        (valve,) = json.loads(run("--json", path=history.path)[1])["valves"]
-        assert valve["trend"]["significant"] is False
-        assert valve["trend"]["drift_n_per_month"] is None
-        assert valve["trend"]["crossing"] is None
+        (valve,) = told(run, path=history.path)
+        found = [valve["trend"][name] for name in ("significant", "drift_n_per_month", "crossing")]
+        assert found == [False, None, None]
 
     def test_two_methods_make_no_common_trend(self, tmp_path, run):
         """The last one's alone: here five days that lie 100 N above those before."""
@@ -86,12 +85,11 @@ class TestTable:
         for day in range(10):
             method, friction = ("bench", 150.0) if day < 5 else ("signature", 250.0)
             history.add(success(START + day * DAY, friction, method=method))
-        (valve,) = json.loads(run("--json", path=history.path)[1])["valves"]
+        (valve,) = told(run, path=history.path)
         assert (valve["trend"]["days"], valve["trend"]["significant"]) == (5, False)
 
     def test_too_few_days_have_no_trend(self, run):
-        _, output, _ = run("--valve", "LV-7")
-        assert "trend" not in output
+        assert "trend" not in run("--valve", "LV-7")[1]
         (valve,) = told(run, "--valve", "LV-7")
         assert valve["trend"] is None
 
@@ -129,8 +127,7 @@ class TestBaselines:
         assert rows[4].strip().endswith(f"OK restore_baseline: none; previous: {new}")
 
     def test_in_json(self, run, changed):
-        _, output, _ = run("--json", path=changed)
-        first, second, third = json.loads(output)["valves"][0]["baselines"]
+        first, second, third = told(run, path=changed)[0]["baselines"]
         assert first == {
             "time": "2026-09-22T14:13:20.000Z",
             "since": "2026-09-21T14:13:20.000Z",
@@ -143,11 +140,8 @@ class TestBaselines:
             "replaced_half_width": 1.0,
             "replaced_sliding": None,
         }
-        assert (second["set_by"], second["baseline"], second["replaced"]) == (
-            "restore_baseline",
-            141.0,
-            600.0,
-        )
+        changes = [second[name] for name in ("set_by", "baseline", "replaced")]
+        assert changes == ["restore_baseline", 141.0, 600.0]
         assert (third["baseline"], third["replaced"]) == (None, 600.0)
 
 
@@ -187,11 +181,9 @@ class TestJson:
 
 
 class TestChoice:
-    @pytest.mark.parametrize("name", ["FV-101", "fv_101", "/fv_101", "/fv_101/identifier"])
-    def test_by_any_name(self, run, name):
-        assert [one["name"] for one in told(run, "--valve", name)] == [VALVE.name]
-
-    def test_several(self, run):
+    def test_by_any_name(self, run):
+        for name in ("FV-101", "fv_101", "/fv_101", "/fv_101/identifier"):
+            assert [one["name"] for one in told(run, "--valve", name)] == [VALVE.name]
         found = told(run, "--valve", "area_2/lv_7", "--valve", "FV-101")
         assert {one["name"] for one in found} == {VALVE.name, OTHER.name}
 
@@ -216,9 +208,9 @@ class TestChoice:
         for day in range(9):
             history.add(success(START + day * DAY, 150.0 + day, 0.1))
         history.set_baseline(VALVE, KeptBaseline(BASELINE, START + 6 * DAY, START + 6 * DAY))
-        _, output, _ = run("--json", "--until", "2026-09-26", path=history.path)
-        assert json.loads(output)["valves"][0]["trend"]["days"] == 6
-        assert json.loads(run("--json", path=history.path)[1])["valves"][0]["trend"] is None
+        (before,) = told(run, "--until", "2026-09-26", path=history.path)
+        assert before["trend"]["days"] == 6
+        assert told(run, path=history.path)[0]["trend"] is None
 
 
 def test_csv(run, tmp_path, file):
@@ -258,28 +250,27 @@ class TestErrors:
         for word in words:
             assert word in errors
 
-    def test_no_file(self, run, tmp_path):
+    def test_no_file_and_an_empty_one(self, run, tmp_path):
         path = tmp_path / "none.sqlite"
         self.refused(run(path=path), str(path), "there is no such file")
         assert not path.exists()
+        HistoryFile(path).prepare()
+        self.refused(run(path=path), "no identification")
 
-    def test_empty(self, run, tmp_path):
-        history = HistoryFile(tmp_path / "empty.sqlite")
-        history.prepare()
-        self.refused(run(path=history.path), "no identification")
-
-    def test_unknown_valve(self, run):
-        self.refused(run("--valve", "FV-999"), "FV-999", VALVE.name, OTHER.name)
-
-    def test_nothing_then(self, run):
-        self.refused(run("--until", "1999-12-31"), "no identification of these valves")
-
-    @pytest.mark.parametrize("time", ["yesterday", "2026-13-01", "1969-12-31", "3000-01-01"])
-    def test_no_time(self, run, time):
-        self.refused(run("--since", time), "--since", time)
-
-    def test_no_picture(self, run, tmp_path):
-        self.refused(run("--plot", tmp_path / "history.txt"), "not a picture format")
+    @pytest.mark.parametrize(
+        ("options", "words"),
+        [
+            (["--valve", "FV-999"], ["FV-999", VALVE.name, OTHER.name]),
+            (["--until", "1999-12-31"], ["no identification of these valves"]),
+            (["--since", "yesterday"], ["--since", "yesterday"]),
+            (["--since", "2026-13-01"], ["--since", "2026-13-01"]),
+            (["--since", "1969-12-31"], ["--since", "1969-12-31"]),
+            (["--since", "3000-01-01"], ["--since", "3000-01-01"]),
+            (["--plot", "history.txt"], ["not a picture format"]),
+        ],
+    )
+    def test_options(self, run, options, words):
+        self.refused(run(*options), *words)
 
     def test_too_many_panels(self, run, tmp_path):
         history = HistoryFile(tmp_path / "many.sqlite")

@@ -61,11 +61,8 @@ def test_in_json(run):
     (valve,) = json.loads(run("--json")[1])["valves"]
     assert valve["usage"]["since_renewal"]["distance"] == 1.5
     assert valve["usage"]["renewal"] == "2026-09-23T14:13:20Z"
-    assert [one["day"] for one in valve["usage"]["days"]] == [
-        "2026-09-21",
-        "2026-09-22",
-        "2026-09-23",
-    ]
+    days = [one["day"] for one in valve["usage"]["days"]]
+    assert days == ["2026-09-21", "2026-09-22", "2026-09-23"]
     assert valve["alarm_recordings"][1] == {
         "time": "2026-09-21T14:13:20Z",
         "level": "ERROR",
@@ -83,16 +80,10 @@ def test_days(run, monkeypatch):
     assert "LV-7 /area_2/lv_7/identifier" in lines
     assert "2026-09-22 1.5 10 4 21 1 20 not known" in lines
     assert "2026-09-23 1.5 10 4 21 1 20 2026-09-23" in lines
-
-
-def test_the_sum_of_chosen_days_names_them(run, monkeypatch):
-    monkeypatch.setenv("COLUMNS", "160")
     code, output, _ = run("--usage", "--valve", "FV-101", "--until", "2026-09-22")
     assert code == 0
-    assert (
-        "3 m of travel, 20 reversals, 8 breakaways in 42 h of watching, from 2026-09-21 to"
-        in output
-    )
+    total = "3 m of travel, 20 reversals, 8 breakaways in 42 h of watching, from 2026-09-21 to"
+    assert total in output
     assert "in all" not in output
 
 

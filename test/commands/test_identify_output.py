@@ -9,10 +9,8 @@
 
 """The sub-command `identify` as people and programs use it: table, picture, JSON, and refusals."""
 
-import dataclasses
 import json
 import math
-import re
 import subprocess
 import sys
 
@@ -21,17 +19,14 @@ import numpy as np
 import pytest
 from answers import KEYS, column, known, none_for_nan, row_of, values
 
-from valve_friction_ros.commands.identify import print_table
 from valve_friction_ros.identification import (
     PARAMETER_UNITS,
     UNITS,
     IdentificationSettings,
-    Parameter,
-    Verdict,
     identify_bench,
     published_estimate,
 )
-from valve_friction_ros.model import BENCH_VALVE, LOW_FRICTION, Recording, simulate
+from valve_friction_ros.model import BENCH_VALVE, LOW_FRICTION
 from valve_friction_ros.wording import two_digits
 
 SETTINGS = IdentificationSettings(assumed_mass=1.6)  # of the valve file
@@ -82,25 +77,6 @@ class TestTable:
         for warning in answer["warnings"]:
             assert f"note: {warning}" in words
 
-    def test_doubt_of_the_model_is_a_note(self, result, capsys):
-        """And what was not identified leaves a dash, the published value beside it or not."""
-        doubt = "the Karnopp model does not describe this valve: 98 µm [of the misfit] is not noise"
-        friction = Parameter(
-            "coulomb_friction", math.nan, math.nan, math.nan, Verdict.NOT_IDENTIFIABLE, doubt
-        )
-        doubted = dataclasses.replace(
-            result,
-            warnings=(doubt,),
-            parameters={**result.parameters, "coulomb_friction": friction},
-        )
-        print_table(doubted)
-        out = capsys.readouterr().out
-        assert row_of(out, "coulomb_friction") == "coulomb_friction – N not identifiable"
-        words = " ".join(out.split())
-        assert f"coulomb_friction not identifiable: {doubt}" in words
-        assert f"note: {doubt}" in words
-        assert "nan" not in out
-
 
 class TestPlot:
     def test_a_picture_and_the_numbers(self, call, quick_csv, bench_options, tmp_path):
@@ -120,11 +96,11 @@ class TestPlot:
             ("no/record.png", "there is no folder"),
         ],
     )
-    def test_a_place_it_cannot_go_to(self, call, quick_csv, bench_options, tmp_path, name, message):
-        code, out, err = call(quick_csv, *bench_options, "--plot", tmp_path / name)
-        assert (code, out) == (2, "")
-        assert err.startswith(f"valve_friction identify: {tmp_path / name}: {message}")
-        assert err.count("\n") == 1
+    def test_a_place_it_cannot_go_to(
+        self, refusal, quick_csv, bench_options, tmp_path, name, message
+    ):
+        told = refusal(quick_csv, *bench_options, "--plot", tmp_path / name)
+        assert told.startswith(f"{tmp_path / name}: {message}")
 
 
 POSITION_BIAS = 1.13e-3
@@ -177,14 +153,6 @@ class TestProcesses:
         assert "coulomb_friction" in done.stdout
         assert picture.read_bytes().startswith(PNG)
 
-    def test_one_line_for_a_bad_file(self, tmp_path, bench_options):
-        """Not even a warning of a library stands beside it."""
-        path = tmp_path / "record.csv"
-        path.write_text("time_s,position_m,pressure_pa\n")
-        done = run(path, *bench_options)
-        assert (done.returncode, done.stdout) == (2, "")
-        assert re.fullmatch(r"valve_friction identify: \S+record\.csv: .+\n", done.stderr)
-
 
 class TestJson:
     def test_the_result_of_the_library(self, printed, quick_csv, result, bench_options):
@@ -214,7 +182,6 @@ class TestJson:
 
 
 ALL = ("mass=1.542", "viscous_friction=4865", "coulomb_friction=152.7", "spring_constant=2.05e5")
-METHOD = ("--method", "bench")
 
 
 @pytest.mark.parametrize(
@@ -231,7 +198,7 @@ METHOD = ("--method", "bench")
 def test_the_diagnosis_may_fail_the_command(
     call, quick_csv, bench_options, baseline, level, fail_on, code
 ):
-    options = ["--baseline-coulomb-friction", baseline, *METHOD, "--json"]
+    options = ["--baseline-coulomb-friction", baseline, *BENCH, "--json"]
     options += ["--fail-on", fail_on] if fail_on else []
     found, out, err = call(quick_csv, *bench_options, *options)
     assert (found, err) == (code, "")
@@ -239,7 +206,7 @@ def test_the_diagnosis_may_fail_the_command(
 
 
 def test_without_a_baseline_nothing_was_compared(call, quick_csv, bench_options):
-    code, out, err = call(quick_csv, *bench_options, *METHOD, "--fail-on", "warn")
+    code, out, err = call(quick_csv, *bench_options, *BENCH, "--fail-on", "warn")
     assert code == 0
     assert out.splitlines()[-1].startswith("unknown: no baseline yet; ")
     assert err == (
@@ -361,34 +328,6 @@ def test_records(refusal, write_csv, columns_of, quick_record, bench_options, ch
     told = refusal(path, *bench_options, *how, "--plot", picture)
     assert told.startswith(f"{path}: {message}")
     assert not picture.exists()
-
-
-def test_sampled_too_slowly(refusal, write_csv, columns_of, benches, bench_options):
-    """Ten samples a second of a stem that crosses its range within one of them."""
-    pressure = np.where(np.arange(400) // 20 % 2, 160e3, 64e3)
-    position = simulate(*benches["low"], pressure, 0.1).position
-    path = write_csv(columns_of(Recording(0.1, pressure, position)))
-    message = refusal(path, *bench_options)
-    assert message.startswith(f"{path}: sampling is too slow for the motion: the stem moves ")
-
-
-def test_no_file(refusal, tmp_path, bench_options):
-    path = tmp_path / "none.csv"
-    expected = f"{path}: cannot be read as CSV: No such file or directory"
-    assert refusal(path, *bench_options) == expected
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("travel: 0.03", "diaphragm_area is missing"),
-        ("diaphragm_area: 1.0\nmas: 1.0", "unknown key 'mas'; did you mean 'mass'?"),
-    ],
-)
-def test_valve_file(refusal, quick_csv, tmp_path, text, message):
-    path = tmp_path / "valve.yaml"
-    path.write_text(text)
-    assert refusal(quick_csv, "--valve", path).startswith(f"{path}: {message}")
 
 
 def test_no_valve_file_for_a_pressure(refusal, quick_csv):

@@ -82,35 +82,26 @@ class TestChoice:
         assert capsys.readouterr().out == f"valve_friction {__version__}\n"
 
     @pytest.mark.parametrize(
-        ("name", "nearest"),
+        ("arguments", "speaker", "words"),
         [
-            ("identfy", "identify"),
-            ("identify_recording", "identify"),
-            ("identify_folder", "identify-folder"),
-            ("validate_recording", "validate"),
-            ("reproduce_paper", "reproduce-paper"),
-            ("histroy", "history"),
+            ("identfy a.csv --json", "", "unknown sub-command 'identfy'; the nearest is 'identi"),
+            ("identify_folder a", "", "'identify_folder'; the nearest is 'identify-folder'"),
+            ("", "", "the following arguments are required: SUB-COMMAND"),
+            ("--json identify", "", ""),
+            ("history --jason", " history", "unrecognized arguments: --jason"),
+            ("call fv_101 idnetify", " call", "unknown service 'idnetify'; did you mean 'identify"),
         ],
     )
-    def test_a_wrong_name_suggests_the_nearest(self, command, capsys, name, nearest):
+    def test_wrong_arguments(self, command, capsys, arguments, speaker, words):
+        """One line, which names the sub-command if there is one."""
         with pytest.raises(SystemExit) as end:
-            command(name, "record.csv", "--json")
-        assert end.value.code == 2
-        assert capsys.readouterr() == (
-            "",
-            f"valve_friction: unknown sub-command '{name}'; the nearest is '{nearest}'; see "
-            "--help\n",
-        )
-
-    @pytest.mark.parametrize("arguments", [[], ["--json", "identify"]])
-    def test_no_name(self, command, capsys, arguments):
-        with pytest.raises(SystemExit) as end:
-            command(*arguments)
+            command(*arguments.split())
         assert end.value.code == 2
         out, err = capsys.readouterr()
-        assert out == ""
-        assert err.startswith("valve_friction: ")
-        assert err.count("\n") == 1
+        assert (out, err.count("\n")) == ("", 1)
+        assert err.startswith(f"valve_friction{speaker}: ")
+        assert err.endswith("; see --help\n")
+        assert words in err
 
     @pytest.mark.parametrize("name", SUB_COMMANDS)
     def test_each_describes_itself(self, command, capsys, name):
@@ -122,15 +113,7 @@ class TestChoice:
         assert "exit code 2" in " ".join(out.lower().replace("; 2:", " exit code 2").split())
         file = re.sub("[- ]", "_", name)
         module = importlib.import_module(f"valve_friction_ros.commands.{file}")
-        assert all(issubclass(error, Exception) for error in module.REFUSALS)
-
-    def test_an_unknown_option_names_the_sub_command(self, command, capsys):
-        with pytest.raises(SystemExit) as end:
-            command("history", "--jason")
-        assert end.value.code == 2
-        assert capsys.readouterr().err == (
-            "valve_friction history: unrecognized arguments: --jason; see --help\n"
-        )
+        assert callable(module.run)
 
 
 class TestEnd:
@@ -281,13 +264,6 @@ class TestRealSubCommands:
         assert picture.stat().st_size > 20_000
 
 
-def test_a_misspelled_service_gets_the_nearest_name(capsys):
-    with pytest.raises(SystemExit) as end:
-        run(["call", "fv_101", "idnetify"])
-    assert end.value.code == 2
-    assert "unknown service 'idnetify'; did you mean 'identify'?" in capsys.readouterr().err
-
-
 TEXT = """
     --plot FILE.png: draw it, --on a grid
         of 5 %%
@@ -298,47 +274,33 @@ TEXT = """
     """
 
 
-@pytest.fixture
-def parser():
+def test_options_from_their_help():
+    """Paths, texts, flags, and what is said beside."""
     parser = argparse.ArgumentParser()
     add_options(parser, TEXT, name={"default": "all"}, jobs={"type": int, "required": True})
-    return parser
-
-
-def test_paths_texts_flags_and_what_is_said_beside(parser):
     given = ["--plot", "a.png", "--folder", "b", "--json", "--jobs", "2"]
     wanted = argparse.Namespace(plot=Path("a.png"), folder=Path("b"), json=True, name="all", jobs=2)
     assert parser.parse_args(given) == wanted
     left_out = argparse.Namespace(plot=None, folder=None, json=False, name="all", jobs=2)
     assert parser.parse_args(["--jobs", "2"]) == left_out
-
-
-def test_the_help_is_the_text(parser):
     shown = " ".join(parser.format_help().split())
     for words in ("--plot FILE.png draw it, --on a grid of 5 %", "--name NAME of it (all)"):
         assert words in shown
 
 
-@pytest.mark.parametrize(("text", "share"), [("90", 0.9), ("2.5 %", 0.025), ("-10", -0.1)])
-def test_percent(text, share):
-    assert percent(text) == pytest.approx(share)
-
-
-@pytest.mark.parametrize("text", ["101", "many", "nan", ""])
-def test_no_percent(text):
-    with pytest.raises(argparse.ArgumentTypeError, match="is not a percentage, such as 90"):
-        percent(text)
+def test_percent():
+    for text, share in (("90", 0.9), ("2.5 %", 0.025), ("-10", -0.1)):
+        assert percent(text) == pytest.approx(share)
+    for text in ("101", "many", "nan", ""):
+        with pytest.raises(argparse.ArgumentTypeError, match="is not a percentage, such as 90"):
+            percent(text)
 
 
 PASSWORD = "correct horse battery"
 
 
-def typed(monkeypatch, text):
-    monkeypatch.setattr(sys, "stdin", io.StringIO(text))
-
-
 def test_a_piped_password(monkeypatch, capsys):
-    typed(monkeypatch, f"{PASSWORD}\n")
+    monkeypatch.setattr(sys, "stdin", io.StringIO(f"{PASSWORD}\n"))
     assert run(["dashboard-account", "anna", "--role", "operate"]) == 0
     printed = capsys.readouterr()
     account = Account.read(printed.out)
@@ -351,12 +313,9 @@ def test_a_piped_password(monkeypatch, capsys):
     ("name", "password", "words"),
     [("anna", "short", "10 to 200 characters"), ("an na", PASSWORD, "the name of an account")],
 )
-def test_what_is_refused(monkeypatch, capsys, name, password, words):
-    typed(monkeypatch, f"{password}\n")
-    assert run(["dashboard-account", name]) == 2
-    printed = capsys.readouterr()
-    assert printed.out == ""
-    assert words in printed.err
+def test_what_is_refused(monkeypatch, refused, name, password, words):
+    monkeypatch.setattr(sys, "stdin", io.StringIO(f"{password}\n"))
+    assert words in refused("dashboard-account", name)
 
 
 def test_a_terminal_is_asked_twice(monkeypatch, capsys):

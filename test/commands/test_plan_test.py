@@ -39,15 +39,14 @@ def plan(command, bench_yaml, tmp_path):
 
 
 @pytest.fixture
-def refusal(plan, tmp_path):
+def refusal(refused, bench_yaml, tmp_path):
     """Function of options: the one line on stderr; nothing is written."""
 
     def refusal(*options):
-        code, out, err = plan(*options)
-        assert (code, out) == (2, "")
-        assert not (tmp_path / "test.csv").exists()
-        (line,) = err.splitlines()
-        return line.removeprefix("valve_friction plan-test: ")
+        output = tmp_path / "test.csv"
+        line = refused("plan-test", "--valve", bench_yaml, "--output", output, *options)
+        assert not output.exists()
+        return line
 
     return refusal
 
@@ -113,17 +112,10 @@ def friction(out):
 
 
 def test_an_earlier_result_and_the_history_know_the_friction(plan, tmp_path):
-    parameters = {
-        name: {"value": value}
-        for name, value in (
-            ("coulomb_friction", 200.0),
-            ("static_friction", None),
-            ("viscous_friction", 5e3),
-            ("spring_constant", 2.05e5),
-            ("spring_preload", 231.65),
-        )
-    }
+    values = {"coulomb_friction": 200.0, "static_friction": None, "viscous_friction": 5e3}
+    values |= {"spring_constant": 2.05e5, "spring_preload": 231.65}
     estimate = tmp_path / "estimate.json"
+    parameters = {name: {"value": value} for name, value in values.items()}
     estimate.write_text(json.dumps({"parameters": parameters}))
     code, out, _ = plan("--estimate", estimate, *QUICK, "--json")
     assert code == 0
@@ -145,9 +137,6 @@ def test_without_any_friction_a_range_is_planned_for(plan):
 
 def test_refusals(refusal, tmp_path):
     assert refusal().startswith("the spring_constant is unknown")
-    narrow = refusal(*SPRING, "--coulomb-friction", "900", "--from", "49", "--to", "51")
-    assert narrow.startswith("a reversal would not move the stem between 49 and 51 %")
-    assert narrow.endswith("widen the part of the travel")
     assert refusal(*KNOWN, "--duration", "3").startswith("3 s do not allow")
     assert refusal(*KNOWN, "--from", "70", "--to", "30").startswith("the part of the travel")
     assert "2 spring" not in refusal(*KNOWN, "--friction-factor", "0.5")
@@ -205,10 +194,8 @@ class TestWithoutRos:
     def test_table_and_form_in_psi_and_inch(self, plan, tmp_path, capsys):
         """1 psi is 6894.757 Pa, and 1 in 25.4 mm: the same steps, to 1 Pa and to 0.01 mm."""
         written = {}
-        for name, units in (
-            ("si", ()),
-            ("us", ("--pressure-unit", "PSI", "--position-unit", "inch")),
-        ):
+        us = ("--pressure-unit", "PSI", "--position-unit", "inch")
+        for name, units in (("si", ()), ("us", us)):
             table, form = tmp_path / f"{name}.csv", tmp_path / f"{name}.txt"
             options = ("--table", table, "--form", form, "--replace", *units)
             assert plan(*KNOWN, *QUICK, *options)[0] == 0

@@ -30,22 +30,23 @@ from valve_friction_ros.model import (
 RATE = 100
 
 
-def simulated(bench, excitation, duration):
-    pressure = excitation.sample(np.arange(round(duration * RATE)) / RATE)
-    position = simulate(*bench, pressure, 1 / RATE).position
-    noise = SensorNoise(10e-6, 100.0, seed=1)
-    return noise.applied_to(Recording(1 / RATE, pressure, position))
+@pytest.fixture
+def file_of(benches, write_csv, columns_of):
+    """Function of an excitation, its duration and a name: the noisy record of a tight packing."""
 
+    def file_of(excitation, duration, name):
+        pressure = excitation.sample(np.arange(round(duration * RATE)) / RATE)
+        position = simulate(*benches["high"], pressure, 1 / RATE).position
+        record = Recording(1 / RATE, pressure, position)
+        return write_csv(columns_of(SensorNoise(10e-6, 100.0, seed=1).applied_to(record)), name)
 
-@pytest.fixture(scope="module")
-def other_record(benches):
-    """The paper's sine, one period."""
-    return simulated(benches["high"], SineWave(), 35.5)
+    return file_of
 
 
 @pytest.fixture
-def other_csv(write_csv, columns_of, other_record):
-    return write_csv(columns_of(other_record), "other.csv")
+def other_csv(file_of):
+    """The paper's sine, one period."""
+    return file_of(SineWave(), 35.5, "other.csv")
 
 
 @pytest.fixture
@@ -87,21 +88,10 @@ def refused(refused):
     [("bench", SineWave(period=10.0), 40.0), ("signature", TriangleWave(), 130.0)],
 )
 def test_a_model_validates_on_a_record_it_has_not_seen(
-    method,
-    excitation,
-    duration,
-    benches,
-    write_csv,
-    columns_of,
-    other_csv,
-    bench_options,
-    tmp_path,
-    command,
-    call,
+    method, excitation, duration, file_of, other_csv, bench_options, tmp_path, command, call
 ):
     """A record that suits the method is identified, and the slow sine simulated with the model."""
-    record = simulated(benches["high"], excitation, duration)
-    path = write_csv(columns_of(record), "identified.csv")
+    path = file_of(excitation, duration, "identified.csv")
     code, printed, _ = command("identify", path, *bench_options, "--method", method, "--json")
     assert code == 0
     estimate = tmp_path / "estimate.json"
@@ -123,7 +113,8 @@ class TestAnswer:
         code, out, _ = call(other_csv, *bench_options, "--estimate", path, "--json")
         assert code == 0
         answer = json.loads(out, parse_constant=pytest.fail)
-        record = Recording(1 / RATE, *self.columns(other_csv))
+        table = np.loadtxt(other_csv, delimiter=",", skiprows=1)
+        record = Recording(1 / RATE, table[:, 2], table[:, 1])
         model = KarnoppParameters(1.75, 4.48e4, 606.0, 606.0, 2.05e5, 231.65)
         expected = validate(record, BENCH_VALVE, model)
         assert answer["fit"] == expected.fit
@@ -133,11 +124,6 @@ class TestAnswer:
         assert answer["samples"] == len(record)
         assert answer["notes"] == []
         assert KarnoppParameters(**answer["parameters"]) == model
-
-    @staticmethod
-    def columns(path):
-        table = np.loadtxt(path, delimiter=",", skiprows=1)
-        return table[:, 2], table[:, 1]
 
     def test_for_people(self, call, estimate, other_csv, bench_options):
         _, out, _ = call(other_csv, *bench_options, "--estimate", estimate())
@@ -189,10 +175,7 @@ class TestRefusals:
         [
             ("{", "not JSON"),
             ("[" * 100_000, "not JSON: it is nested too deeply"),
-            (
-                "[]",
-                "contains no parameters: give a file written by `valve_friction identify --json`",
-            ),
+            ("[]", "contains no parameters: give a file written by `valve_friction identify --js"),
             ('{"valves": {}}', "contains several valves: identify one of them with --valve-name"),
             ('{"parameters": {"mass": 1}}', "parameters.mass has no value"),
             ('{"parameters": {"mass": {"value": "1"}}}', "must be a number or null, got '1'"),

@@ -107,8 +107,11 @@ class TestWholeBags:
         assert_equal(valve.recording(), record)
         assert (valve.name, valve.notes) == ("/fv_101", ())
 
-    def test_what_the_node_would_have(self, bag_of, record):
-        """The last second before the end, out of the very buffer of the node."""
+    def test_parts(self, bag_of, record):
+        """A stretch; and the last second before the end, as the buffer of the node has it."""
+        options = ReadingOptions(stretch=Stretch(begin=0.5, end=1.5))
+        (valve,) = read_recordings(bag_of(), BENCH_VALVE, options)
+        np.testing.assert_array_equal(valve.recording().position, record.position[500:1501])
         buffer = RecordBuffer(BENCH_VALVE, 1.0)
         for stamp, p, x in zip(stamps_of(record), record.pressure, record.position, strict=True):
             buffer.add_pressure(int(stamp), p)
@@ -122,20 +125,10 @@ class TestWholeBags:
         assert (found.start_time, len(found)) == (expected.start_time, 1001)
         assert valve.notes == ()
 
-    def test_stretch(self, bag_of, record):
-        options = ReadingOptions(stretch=Stretch(begin=0.5, end=1.5))
-        (valve,) = read_recordings(bag_of(), BENCH_VALVE, options)
-        np.testing.assert_array_equal(valve.recording().position, record.position[500:1501])
-
     def test_by_header_stamps_in_the_order_of_recording(self, tmp_path, record):
         """Receive times of two topics cross, and jitter; without an index as with one."""
-        late = [
-            (topic, kind, stamp, data)
-            for topic, kind, stamp, data in messages_of(record)
-            if kind == STEM
-        ]
-        early = [message for message in messages_of(record) if message[1] == PRESSURE]
-        bag = write_bag(tmp_path / "bag", [*late, *early])
+        one_by_one = sorted(messages_of(record), key=lambda message: message[1], reverse=True)
+        bag = write_bag(tmp_path / "bag", one_by_one)
         assert_equal(only(bag).recording(), record)
         without_summary(storage_file(bag))
         assert_equal(only(bag).recording(), record)
@@ -225,11 +218,7 @@ class TestBadSamples:
 
     def test_time_that_jumped(self, tmp_path, record):
         """What came before is forgotten, as the node forgets it; a note says so."""
-        again = [
-            (topic, kind, stamp, data)
-            for topic, kind, stamp, data in messages_of(record)
-            if stamp >= START + 1000 * PERIOD
-        ]
+        again = [one for one in messages_of(record) if one[2] >= START + 1000 * PERIOD]
         bag = write_bag(tmp_path / "bag", [*messages_of(record), *again])
         without_summary(storage_file(bag))  # else the reader sorts by the time of receipt
         valve = only(bag)
@@ -251,25 +240,18 @@ class TestBadSamples:
         )
 
     def test_gap(self, tmp_path):
-        messages = [
-            message for message in with_pressure() if not 10 < (message[2] - START) / 1e6 < 30
-        ]
-        recording = only(write_bag(tmp_path / "bag", messages)).recording()
+        def without(begin, end):
+            kept = (m for m in with_pressure() if not begin < (m[2] - START) / PERIOD < end)
+            return write_bag(tmp_path / f"to_{end}", kept)
+
+        recording = only(without(10, 30)).recording()
         assert recording.gap == (
             "gap of 0.02 s in /fv_101/actuator_pressure, 0.010 s after its first sample: use a "
             "stretch of the record without it"
         )
         assert len(recording) == 50
         assert recording.stamped.drive.time.size == 31
-
-    def test_more_gap_than_samples(self, tmp_path):
-        messages = [
-            message for message in with_pressure() if not 10 < (message[2] - START) / 1e6 < 40
-        ]
-        assert problem(write_bag(tmp_path / "bag", messages)) == (
-            ", /fv_101: gap of 0.03 s in /fv_101/actuator_pressure, 0.010 s after its first "
-            "sample: use a stretch of the record without it"
-        )
+        assert problem(without(10, 40)).startswith(", /fv_101: gap of 0.03 s in /fv_101/actuator_p")
 
     def test_one_topic_is_silent(self, tmp_path):
         messages = list(with_pressure())
@@ -312,14 +294,12 @@ def cut(path, share):
 class TestDamagedBags:
     """What can be read is read, and a note says that there was more."""
 
-    def test_without_metadata(self, bag_of, record):
+    @pytest.mark.parametrize("text", [None, "rosbag2_bagfile_information: ["])
+    def test_without_metadata_that_can_be_read(self, bag_of, record, text):
         bag = bag_of("sqlite3")
         (bag / "metadata.yaml").unlink()
-        assert_equal(only(bag).recording(), record)
-
-    def test_metadata_of_nonsense(self, bag_of, record):
-        bag = bag_of()
-        (bag / "metadata.yaml").write_text("rosbag2_bagfile_information: [")
+        if text is not None:
+            (bag / "metadata.yaml").write_text(text)
         assert_equal(only(bag).recording(), record)
 
     @pytest.mark.parametrize("compression", ["none", "message", "storage"])
@@ -337,14 +317,13 @@ class TestDamagedBags:
         bag = bag_of(storage, compression)
         file = storage_file(bag)
         cut(file, share)
-        for path in (bag, file):
-            valve = only(path)
-            found = valve.recording()
-            assert_equal(found, record, len(found))
-            assert len(found) > 0.4 * share * len(record)
-            (note,) = valve.notes
-            assert note.startswith(f"{file.name} is truncated or damaged (")
-            assert note.endswith("): it was read as far as possible")
+        valve = only(bag)
+        found = valve.recording()
+        assert_equal(found, record, len(found))
+        assert len(found) > 0.4 * share * len(record)
+        (note,) = valve.notes
+        assert note.startswith(f"{file.name} is truncated or damaged (")
+        assert note.endswith("): it was read as far as possible")
 
     def test_sqlite_without_the_way_to_its_rows(self, tmp_path):
         """So long a table that its inner pages, which lead to the rows, are behind the cut."""
@@ -428,7 +407,7 @@ class TestDamagedBags:
             left = bag.with_name("left")
             shutil.copytree(bag, left)
         database.close()
-        assert storage_file_and_log(left) == {file.name, f"{file.name}-wal", f"{file.name}-shm"}
+        assert (left / f"{file.name}-wal").exists()
         valve = only(left)
         assert_equal(valve.recording(), record)
         assert valve.notes == (
@@ -445,18 +424,27 @@ class TestDamagedBags:
         assert_equal(found, record, len(found))
 
 
-def storage_file_and_log(bag):
-    return {path.name for path in bag.iterdir()} - {"metadata.yaml"}
-
-
 class TestNoBags:
     """One line that says what to do."""
 
-    @pytest.mark.parametrize("name", ["record.mcap", "record.db3", "record.mcap.zstd"])
-    def test_empty_file(self, tmp_path, name):
+    @pytest.mark.parametrize(
+        ("name", "content", "cause"),
+        [
+            ("record.mcap", b"", "the file is empty: nothing was recorded or copied"),
+            ("record.db3", b"", "the file is empty: nothing was recorded or copied"),
+            ("record.mcap.zstd", b"", "the file is empty: nothing was recorded or copied"),
+            ("a.bag", b"#ROSBAG V2.0\n    ", "a ROS 1 bag: convert it with rosbags-convert"),
+            (
+                "record.mcap",
+                gzip.compress(b"time_s,position_m,pressure_pa\n"),
+                "neither MCAP nor SQLite3, despite its name: record it again",
+            ),
+        ],
+    )
+    def test_no_storage_file(self, tmp_path, name, content, cause):
         path = tmp_path / name
-        path.write_bytes(b"")
-        assert problem(path) == ": the file is empty: nothing was recorded or copied"
+        path.write_bytes(content)
+        assert problem(path) == f": {cause}"
 
     def test_nothing_of_it_is_left(self, bag_of):
         for kind in KINDS:
@@ -465,20 +453,15 @@ class TestNoBags:
             assert ": it cannot be " in problem(file)
             assert problem(file).endswith("copy or record it again")
 
-    def test_missing(self, tmp_path):
+    def test_no_file_and_folders_without_a_bag(self, tmp_path, bag_of):
         assert problem(tmp_path / "record.mcap") == ": no such file or folder"
-
-    def test_a_folder_under_the_name_of_a_file(self, bag_of):
+        (tmp_path / "notes.txt").write_text("none")
+        told = problem(tmp_path)
+        assert told.startswith(": not a bag: the folder contains no .mcap or .db3 file")
         bag = bag_of()
         storage_file(bag).unlink()
         (bag / "record.mcap").mkdir()
         assert problem(bag) == ": cannot be read: Is a directory"
-
-    def test_folder_without_a_bag(self, tmp_path):
-        (tmp_path / "notes.txt").write_text("none")
-        assert problem(tmp_path).startswith(
-            ": not a bag: the folder contains no .mcap or .db3 file"
-        )
 
     def test_bag_without_topics(self, tmp_path):
         for storage in STORAGES:
@@ -486,26 +469,11 @@ class TestNoBags:
             assert problem(bag) == ": the bag is empty: the recorder received no messages"
 
     def test_topics_without_messages(self, tmp_path):
-        bag = write_bag(tmp_path / "bag", list(with_pressure())[:2])
-        file = storage_file(write_bag(tmp_path / "other", list(with_pressure())[:2], "sqlite3"))
+        file = storage_file(write_bag(tmp_path / "bag", list(with_pressure())[:2], "sqlite3"))
         with sqlite3.connect(file) as database:
             database.execute("DELETE FROM messages")
         database.close()
         assert problem(file).startswith(", /fv_101: no samples of /fv_101/actuator_pressure")
-        assert problem(bag) == (
-            ", /fv_101: only one sample of /fv_101/actuator_pressure: "
-            "check that it is sampled continuously"
-        )
-
-    def test_ros_1(self, tmp_path):
-        path = tmp_path / "record.bag"
-        path.write_bytes(b"#ROSBAG V2.0\n" + bytes(100))
-        assert problem(path) == ": a ROS 1 bag: convert it with rosbags-convert"
-
-    def test_something_else_under_that_name(self, tmp_path):
-        path = tmp_path / "record.mcap"
-        path.write_bytes(gzip.compress(b"time_s,position_m,pressure_pa\n"))
-        assert problem(path).startswith(": neither MCAP nor SQLite3, despite its name")
 
     @pytest.mark.parametrize("profile", ["", "ros1"])
     def test_mcap_of_something_else(self, bag_of, profile):
@@ -610,14 +578,14 @@ class TestJoints:
         found = only(self.bag(tmp_path / "bag", *names), joint=asked).recording()
         assert found.position[0] == pytest.approx(0.0101 + index, abs=1e-12)
 
-    def test_ambiguous(self, tmp_path):
-        assert problem(self.bag(tmp_path / "bag", "knob", "plug")) == (
-            ", /fv_101: /fv_101/stem_state: several joints (knob, plug): specify which joint is "
-            "the stem"
-        )
-
-    def test_another(self, tmp_path):
-        options = ReadingOptions(topics=TopicChoice(joint="stem"))
-        assert problem(self.bag(tmp_path / "bag", "knob", "plug"), options) == (
-            ", /fv_101: /fv_101/stem_state: no joint 'stem' among knob, plug"
-        )
+    @pytest.mark.parametrize(
+        ("asked", "cause"),
+        [
+            (None, "several joints (knob, plug): specify which joint is the stem"),
+            ("stem", "no joint 'stem' among knob, plug"),
+        ],
+    )
+    def test_none_of_them(self, tmp_path, asked, cause):
+        options = ReadingOptions(topics=TopicChoice(joint=asked))
+        told = problem(self.bag(tmp_path / "bag", "knob", "plug"), options)
+        assert told == f", /fv_101: /fv_101/stem_state: {cause}"

@@ -7,11 +7,18 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The rows that `identify-folder` has on the disk while it runs."""
+"""The rows that `identify-folder` has on the disk, while it runs and at its end."""
 
 import contextlib
+import csv
 import shutil
 import sqlite3
+
+
+def rows_of(path):
+    """Rows of a table, by the names of the recordings of one valve each."""
+    with path.open(newline="") as stream:
+        return {row["recording"]: row for row in csv.DictReader(stream)}
 
 
 def kept(output):

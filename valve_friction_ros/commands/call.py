@@ -13,14 +13,13 @@ import argparse
 import math
 import sys
 
-from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.progress import SpinnerColumn, TextColumn, TimeElapsedColumn
 
 from valve_friction_ros.commands.arguments.identification import has_failed
-from valve_friction_ros.commands.console import OutputConsole
+from valve_friction_ros.commands.console import shown_progress
 from valve_friction_ros.commands.process import ExitCode, StopSignals, complain
 from valve_friction_ros.identification import RefusalError
 
-REFUSALS = (RefusalError,)
 _DISCOVERY = 5.0
 """Time to search for an identifier, s. Chosen: nodes on a network find each other in 1 to 3 s."""
 
@@ -36,11 +35,10 @@ def run(options: argparse.Namespace) -> int:
     except ImportError as error:
         raise ValueError(f"this command needs ROS 2: {error}") from None
 
-    console = OutputConsole(stderr=True)
     columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
     with (
         StopSignals() as stop,
-        Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar,
+        shown_progress(*columns) as bar,
         caller(lambda: not stop.wanted()) as client,
     ):
         task = bar.add_task(f"looking for {options.valve}")

@@ -7,13 +7,14 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Consoles for printing results."""
+"""Consoles for printing results, and the display of progress."""
 
 import errno
 import os
 import sys
 
 from rich.console import Console
+from rich.progress import Progress, ProgressColumn
 
 _PRINTED_WIDTH = 120
 """Width of output to a file or a pipe, columns."""
@@ -25,6 +26,12 @@ class OutputConsole(Console):
     def on_broken_pipe(self) -> None:
         """Reraise the error."""
         raise BrokenPipeError(errno.EPIPE, os.strerror(errno.EPIPE))
+
+
+def shown_progress(*columns: str | ProgressColumn) -> Progress:
+    """Return a display of progress on stderr, if that is a terminal; it vanishes at its end."""
+    console = OutputConsole(stderr=True, highlight=False, markup=False, soft_wrap=True)
+    return Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
 
 
 def plain_console() -> Console:

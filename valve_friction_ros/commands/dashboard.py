@@ -19,9 +19,6 @@ from valve_friction_ros.dashboard import DashboardOptions, Plant
 from valve_friction_ros.dashboard.accounts import Access, accounts_from
 from valve_friction_ros.dashboard.context import INSTALL, DashboardContext
 from valve_friction_ros.dashboard.history_cache import KeptValves
-from valve_friction_ros.history import HistoryError
-
-REFUSALS = (HistoryError,)
 
 
 def _log(line: str) -> None:

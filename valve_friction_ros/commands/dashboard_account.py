@@ -16,8 +16,6 @@ import sys
 from valve_friction_ros.commands.process import ExitCode
 from valve_friction_ros.dashboard.accounts import Account, HashedPassword, Role
 
-REFUSALS = ()
-
 
 def _password() -> str:
     if not sys.stdin.isatty():

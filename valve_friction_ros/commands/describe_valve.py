@@ -26,8 +26,6 @@ from valve_friction_ros.records.valve_description import (
 )
 from valve_friction_ros.records.valve_file import valve_file_of
 
-REFUSALS = ()
-
 
 def _asked(question: ActuatorQuestion) -> Any:
     default = f" [{question.default or 'none'}]" if question.default is not None else ""

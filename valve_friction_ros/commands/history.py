@@ -12,7 +12,8 @@
 import argparse
 import json
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +29,6 @@ from valve_friction_ros.history import (
     AlarmRecording,
     History,
     HistoryEntry,
-    HistoryError,
     KeptBaseline,
     KeptValve,
     Trend,
@@ -124,17 +124,9 @@ def _print_usage_table(
     """
     console = plain_console()
     for valve, usage in valves:
-        table = _valve_table(
-            valve,
-            "day [UTC]",
-            "travel [m]",
-            "reversals",
-            "breakaways",
-            "watched [h]",
-            "near 0 % [h]",
-            "near 100 % [h]",
-            "packing of",
-        )
+        counts = ("travel [m]", "reversals", "breakaways")
+        hours = ("watched [h]", "near 0 % [h]", "near 100 % [h]")
+        table = _valve_table(valve, "day [UTC]", *counts, *hours, "packing of")
         for column in table.columns[1:-1]:
             column.justify = "right"
         for one in usage.days:
@@ -163,16 +155,6 @@ def _print_usage_table(
         console.print()
 
 
-def _write_usage(path: Path, valves: Sequence[tuple[KeptValve, ValveUsage]]) -> None:
-    """Write a row for each day of each valve, oldest first.
-
-    Raises OSError, which names `path`, if writing fails; then no part of the table is left.
-    """
-    rows = [_usage_row(valve, one) for valve, usage in valves for one in usage.days]
-    header = list(_usage_row(KeptValve("", ""), UsedDay(0, 0, Usage())))
-    write_whole(path, csv_text(header, rows).encode())
-
-
 def _usage_row(valve: KeptValve, one: UsedDay) -> dict[str, object]:
     width = 100 // BINS
     times = {
@@ -194,8 +176,7 @@ def _usage_row(valve: KeptValve, one: UsedDay) -> dict[str, object]:
 
 def time_text(time: float, timespec: str = "milliseconds") -> str:
     """Format a time in ns since 1970 in ISO 8601 and UTC."""
-    when = utc(time)
-    return when.isoformat(timespec=timespec).replace("+00:00", "Z")
+    return utc(time).isoformat(timespec=timespec).replace("+00:00", "Z")
 
 
 def _trend_as_json(trend: Trend | None) -> dict[str, Any] | None:
@@ -281,18 +262,11 @@ def _row(entry: HistoryEntry) -> dict[str, object]:
     return row | {"message": diagnosis["message"], "software_version": shown["software_version"]}
 
 
-def _write_csv(path: Path, histories: Sequence[ValveHistory]) -> None:
-    """Write a row for each identification, oldest first; missing values become empty cells.
+def _write_csv(path: Path, rows: Sequence[Mapping[str, object]]) -> None:
+    """Write rows as a table, whose header has the columns of all rows; missing values are empty.
 
-    Raises
-    ------
-    OSError
-        If writing fails; it names `path`, and no part of the table is left.
+    Raises OSError, which names `path`, if writing fails; then no part of the table is left.
     """
-    entries = sorted(
-        (entry for history in histories for entry in history.entries), key=lambda one: one.time
-    )
-    rows = [_row(entry) for entry in entries]
     widest = max(rows, key=len)
     header = [*dict.fromkeys([*widest, *(name for row in rows for name in row)])]
     write_whole(path, csv_text(header, rows).encode())
@@ -331,22 +305,14 @@ def _print_table(histories: Sequence[ValveHistory]) -> None:
     """Print a table per valve with its baselines, followed by the trend."""
     console = plain_console()
     for history in histories:
-        table = _valve_table(
-            history.valve,
-            "time [UTC]",
-            "friction",
-            "[N], ± 95 %",
-            "verdict",
-            "ratio",
-            "level",
-            "diagnosis",
-        )
+        names = ("friction", "[N], ± 95 %", "verdict", "ratio", "level", "diagnosis")
+        table = _valve_table(history.valve, "time [UTC]", *names)
         for column in (2, 4):
             table.columns[column].justify = "right"
         for column in range(6):
             table.columns[column].no_wrap = True
         rows: list[HistoryEntry | KeptBaseline] = [*history.entries, *history.baselines]
-        for row in sorted(rows, key=lambda one: one.time):
+        for row in sorted(rows, key=attrgetter("time")):
             time = time_text(row.time, "seconds")[:-1].replace("T", " ")
             table.add_row(time, *_cells(row))
         console.print(table)
@@ -381,26 +347,19 @@ def _trend_lines(trend: Trend | None) -> list[str]:
     return lines
 
 
-REFUSALS = (HistoryError,)
-
-
-def _usages(options: argparse.Namespace) -> list[tuple[KeptValve, ValveUsage]]:
+def _print_usages(options: argparse.Namespace) -> int:
+    """Print the usage of the chosen valves, and write the requested table."""
     if options.plot is not None or options.fail_on is not None:
         raise ValueError("--usage: neither --plot nor --fail-on belong to it")
-    file, found = History(options.file), []
+    file, usages = History(options.file), []
     since, until = _span(options)
     for valve in chosen_valves(file.valves(), options.valve, "--valve"):
         usage = read_usage(file, valve.name)
         days = [one for one in usage.days if since < (one.day + 1) * DAY and one.day * DAY < until]
         if days:
-            found.append((valve, ValveUsage.of(days, usage.renewal)))
-    if not found:
+            usages.append((valve, ValveUsage.of(days, usage.renewal)))
+    if not usages:
         raise ValueError(f"{options.file}: no usage of these valves within these times")
-    return found
-
-
-def _print_usages(options: argparse.Namespace) -> int:
-    usages = _usages(options)
     try:
         if options.json:
             valves = [
@@ -412,7 +371,8 @@ def _print_usages(options: argparse.Namespace) -> int:
             _print_usage_table(usages, (options.since, options.until) != (EARLIEST, LATEST))
     finally:
         if options.csv is not None:
-            _write_usage(options.csv, usages)
+            rows = [_usage_row(valve, one) for valve, usage in usages for one in usage.days]
+            _write_csv(options.csv, rows)
     return ExitCode.DONE
 
 
@@ -446,7 +406,8 @@ def run(options: argparse.Namespace) -> int:
             _print_table(histories)
     finally:  # a closed output must not prevent the files, nor a full disk the list
         if options.csv is not None:
-            _write_csv(options.csv, histories)
+            entries = (entry for history in histories for entry in history.entries)
+            _write_csv(options.csv, [_row(one) for one in sorted(entries, key=attrgetter("time"))])
         if figure is not None:
             figures.save_picture(figure, options.plot)
     levels = (history.entries[-1].diagnosis.level for history in histories)

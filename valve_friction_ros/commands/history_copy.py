@@ -14,9 +14,7 @@ import json
 
 from valve_friction_ros.commands.arguments.identification import chosen_valves
 from valve_friction_ros.commands.process import ExitCode
-from valve_friction_ros.history import CopiedPart, History, HistoryError, copied
-
-REFUSALS = (HistoryError,)
+from valve_friction_ros.history import CopiedPart, History, copied
 
 
 def _print_table(parts: tuple[CopiedPart, ...]) -> None:

@@ -46,10 +46,7 @@ from valve_friction_ros.health.friction_monitor import (
     identify_recording,
 )
 from valve_friction_ros.health.valve_numbers import RefusedRecordError
-from valve_friction_ros.identification import (
-    RefusalError,
-    Result,
-)
+from valve_friction_ros.identification import RefusalError, Result
 from valve_friction_ros.model import Recording
 from valve_friction_ros.outside_text import printable
 from valve_friction_ros.records.recorded_valve import RecordedValve, Stretch
@@ -57,42 +54,7 @@ from valve_friction_ros.records.recordings import ReadingOptions, read_recording
 from valve_friction_ros.wording import in_zone
 
 
-def as_json(
-    result: Result,
-    notes: Sequence[str] = (),
-    diagnosis: Diagnosis | None = None,
-    findings: Sequence[Finding] = (),
-) -> dict[str, Any]:
-    """Build the JSON object of a result.
-
-    `notes` are added to its warnings. If there is a `diagnosis`, the object includes it and the
-    further `findings`.
-    """
-    shown = result.to_dict()
-    shown["warnings"] = [*notes, *shown["warnings"]]
-    if diagnosis is None:
-        return shown
-    found = [one.to_dict() for one in findings]
-    return shown | {"diagnosis": diagnosis.to_dict(), "findings": found}
-
-
-def print_table(
-    result: Result,
-    notes: Sequence[str] = (),
-    diagnosis: Diagnosis | None = None,
-    findings: Sequence[Finding] = (),
-) -> None:
-    """Print a result for people, followed by `notes`, `diagnosis` and `findings`."""
-    print(result.summary())
-    for note in notes:
-        print(f"note: {printable(note)}")
-    if diagnosis is not None:
-        print(diagnosis)
-    for finding in findings:
-        print(finding)
-
-
-def baseline_from(options: argparse.Namespace) -> Baseline | None:
+def _baseline_from(options: argparse.Namespace) -> Baseline | None:
     """Build the baseline from the parsed arguments.
 
     Raises ValueError if it is impossible, or its interval is given without it.
@@ -109,23 +71,12 @@ def baseline_from(options: argparse.Namespace) -> Baseline | None:
     return Baseline(friction, 0.0 if width is None else width)
 
 
-def _require_report(options: argparse.Namespace) -> None:
-    """Raise ValueError, with file and cause, if the report cannot be written."""
-    if options.report is not None:
-        from valve_friction_ros.reports import require_report_file  # noqa: PLC0415 - slow to import
-
-        require_report_file(options.report)
-
-
 def _dated(path: Path, zone: str) -> str:
     """Return the time of the last change of a file, in words; empty if it is not a file."""
     if not path.is_file():
         return ""
     changed = datetime.fromtimestamp(path.stat().st_mtime, timezone.utc)
     return f"its file was last changed {in_zone(changed, zone)}"
-
-
-REFUSALS = (RefusalError,)
 
 
 class _Answer(NamedTuple):
@@ -136,11 +87,16 @@ class _Answer(NamedTuple):
     diagnosis: Diagnosis | None = None
     findings: tuple[Finding, ...] = ()
 
-    @property
-    def levels(self) -> tuple[Level, ...]:
-        """Levels of the diagnosis and the findings of the valve."""
-        own = () if self.diagnosis is None else (self.diagnosis.level,)
-        return (*own, *(one.level for one in self.findings))
+    def as_json(self) -> dict[str, Any]:
+        """Build the JSON object of the valve; it includes the diagnosis if there is one."""
+        if isinstance(self.outcome, RefusalError):
+            return {"error": str(self.outcome)}
+        shown = self.outcome.to_dict()
+        shown["warnings"] = [*self.recorded.notes, *shown["warnings"]]
+        if self.diagnosis is None:
+            return shown
+        findings = [one.to_dict() for one in self.findings]
+        return shown | {"diagnosis": self.diagnosis.to_dict(), "findings": findings}
 
 
 def _identified(
@@ -214,41 +170,39 @@ def _write_files(
         reports.write_report(reports.identification_report(record), options.report)
 
 
-def _print_json(results: Sequence[_Answer]) -> None:
-    """Print the object of a single valve, or an object with several valves by name."""
-    answers = {
-        recorded.name: {"error": str(outcome)}
-        if isinstance(outcome, RefusalError)
-        else as_json(outcome, recorded.notes, diagnosis, findings)
-        for recorded, outcome, diagnosis, findings in results
-    }
-    answer = {"valves": answers} if len(results) > 1 else next(iter(answers.values()))
-    print(json.dumps(answer, ensure_ascii=False, allow_nan=False))
-
-
-def _print_tables(results: Sequence[_Answer]) -> None:
-    printed = 0
-    for recorded, outcome, diagnosis, findings in results:
+def _print_tables(answers: Sequence[_Answer]) -> None:
+    """Print the results for people, each with its notes, diagnosis and findings."""
+    gap = ""
+    for recorded, outcome, diagnosis, findings in answers:
         if isinstance(outcome, RefusalError):
             continue
-        if len(results) > 1:
-            print("\n" * (printed > 0) + printable(recorded.name))
-        print_table(outcome, recorded.notes, diagnosis, findings)
-        printed += 1
+        if len(answers) > 1:
+            print(gap + printable(recorded.name))
+            gap = "\n"
+        print(outcome.summary())
+        for note in recorded.notes:
+            print(f"note: {printable(note)}")
+        for finding in filter(None, (diagnosis, *findings)):
+            print(finding)
 
 
-def _print(results: Sequence[_Answer], command: str, in_json: bool) -> int:
-    """Print results and refusals; return the exit code."""
-    refusals = [result.outcome for result in results if isinstance(result.outcome, RefusalError)]
-    if in_json and (len(results) > 1 or not refusals):
-        _print_json(results)
+def _print(answers: Sequence[_Answer], command: str, in_json: bool) -> int:
+    """Print results and refusals; return the exit code.
+
+    JSON is the object of a single valve, or an object with several valves by name.
+    """
+    refusals = [one.outcome for one in answers if isinstance(one.outcome, RefusalError)]
+    if in_json and (len(answers) > 1 or not refusals):
+        objects = {one.recorded.name: one.as_json() for one in answers}
+        shown = {"valves": objects} if len(answers) > 1 else next(iter(objects.values()))
+        print(json.dumps(shown, ensure_ascii=False, allow_nan=False))
     elif not in_json:
-        _print_tables(results)
+        _print_tables(answers)
     for refusal in refusals:
         complain(command, refusal)
     if not refusals:
         return ExitCode.DONE
-    return ExitCode.REFUSED if len(refusals) == len(results) else ExitCode.PARTLY
+    return ExitCode.REFUSED if len(refusals) == len(answers) else ExitCode.PARTLY
 
 
 def run(options: argparse.Namespace) -> int:
@@ -261,9 +215,12 @@ def run(options: argparse.Namespace) -> int:
         method_name(options, description.settings),
         survey_limits(options, description),
     )
-    baseline = baseline_from(options)
+    baseline = _baseline_from(options)
     require_outputs(picture=options.plot)
-    _require_report(options)
+    if options.report is not None:
+        from valve_friction_ros.reports import require_report_file  # noqa: PLC0415 - slow to import
+
+        require_report_file(options.report)
     healthy: Recording | None = None
     if options.baseline_recording is not None:
         baseline, healthy = _of_healthy(options, settings, reading)
@@ -278,18 +235,18 @@ def run(options: argparse.Namespace) -> int:
     ):
         if of_one is not None:
             require_one(recorded, purpose)
-    results = []
+    answers = []
     for each in recorded:
         answer = _identified(each, settings, baseline)
         own = answer.diagnosis
         tells = baseline is not None or (own is not None and own.survey is not Survey.UNKNOWN)
         if not tells and options.fail_on is None:
             answer = answer._replace(diagnosis=None)
-        results.append(answer)
+        answers.append(answer)
     try:
-        code = _print(results, options.command, options.json)
+        code = _print(answers, options.command, options.json)
     finally:  # a closed output must not prevent the pictures, nor a full disk the numbers
-        for each, outcome, _, _ in results:
+        for each, outcome, _, _ in answers:
             if isinstance(outcome, Result):
                 zone = reading.columns.time_zone
                 _write_files(options, each, outcome, baseline, healthy, settings.limits, zone)
@@ -299,5 +256,6 @@ def run(options: argparse.Namespace) -> int:
             "--fail-on: no baseline, so friction was not compared: give --baseline-recording or "
             "--baseline-coulomb-friction",
         )
-    levels = (level for each in results for level in each.levels)
+    told = (found for each in answers for found in (each.diagnosis, *each.findings))
+    levels = (found.level for found in told if found is not None)
     return ExitCode.ALARM if has_failed(options, levels) else code

@@ -18,7 +18,7 @@ from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
 from valve_friction_ros.commands.arguments.identification import (
@@ -28,7 +28,7 @@ from valve_friction_ros.commands.arguments.identification import (
     survey_limits,
 )
 from valve_friction_ros.commands.arguments.recording import described, reading_options
-from valve_friction_ros.commands.console import OutputConsole
+from valve_friction_ros.commands.console import OutputConsole, shown_progress
 from valve_friction_ros.commands.process import ExitCode, StopSignals, complain
 from valve_friction_ros.fleet.job import (
     FILING,
@@ -78,17 +78,14 @@ from valve_friction_ros.fleet.workers import (
     usable_cores,
 )
 from valve_friction_ros.health import Level
-from valve_friction_ros.history import HistoryError
 from valve_friction_ros.identification import FIXABLE
 from valve_friction_ros.model import Valve
 from valve_friction_ros.model.checks import frozen
-from valve_friction_ros.records.bags.topics import is_bag
+from valve_friction_ros.records.bags.topics import VALVE_FILE, is_bag
 from valve_friction_ros.records.files import explained, on_disk, place
 from valve_friction_ros.records.recordings import ReadingOptions
 from valve_friction_ros.records.valve_file import ValveFile, read_valve_file
 from valve_friction_ros.streams import utc_second
-
-_VALVE_FILE = "valve.yaml"
 
 
 @dataclass(frozen=True)
@@ -107,9 +104,9 @@ class Plan:
 def _valve_file(found: FoundRecording, common: Path | None) -> Path | None:
     """Choose the valve file closest to a recording."""
     beside = found.path.parent
-    places = [beside / f"{found.stem}.{_VALVE_FILE}", beside / _VALVE_FILE]
+    places = [beside / f"{found.stem}.{VALVE_FILE}", beside / VALVE_FILE]
     if found.path.is_dir():
-        places.insert(1, found.path / _VALVE_FILE)
+        places.insert(1, found.path / VALVE_FILE)
     return next((place for place in places if place.exists()), common)
 
 
@@ -181,17 +178,6 @@ def make_plan(
         yield from plans(found)
 
 
-def _has_reports(entry: RecordingRows, plan: Plan) -> bool:
-    """Return whether the reports of an entry exist or are not requested."""
-    if not isinstance(plan.job, Job) or plan.job.reports is None:
-        return True
-    beside = plan.job.reports.parent
-    return all(
-        row["error"] or (row["report"] and (beside / str(row["report"])).is_file())
-        for row in entry.rows
-    )
-
-
 def _filed(plans: Mapping[str, Plan], options: argparse.Namespace) -> set[tuple[str, str]] | None:
     """Return tag and time of each result in the history; None without a history."""
     if options.history is None:
@@ -203,12 +189,15 @@ def _filed(plans: Mapping[str, Plan], options: argparse.Namespace) -> set[tuple[
     }
 
 
-def _is_filed(entry: RecordingRows, filed: set[tuple[str, str]] | None) -> bool:
-    """Return whether the history has all results of an entry that have a tag and a date."""
-    return filed is None or all(
-        row["error"] or not row["began"] or (str(row["valve"]), str(row["began"])) in filed
-        for row in entry.rows
-    )
+def _is_whole(entry: RecordingRows, plan: Plan, filed: set[tuple[str, str]] | None) -> bool:
+    """Return whether an entry lacks no report, and no result with tag and date in the history."""
+    good = [row for row in entry.rows if not row["error"]]
+    if isinstance(plan.job, Job) and (reports := plan.job.reports) is not None:
+        files = (row["report"] and reports.parent / str(row["report"]) for row in good)
+        if not all(isinstance(file, Path) and file.is_file() for file in files):
+            return False
+    dated = ((str(row["valve"]), str(row["began"])) for row in good if row["began"])
+    return filed is None or filed.issuperset(dated)
 
 
 def forget_stale(
@@ -228,8 +217,8 @@ def forget_stale(
         if plan is None:
             continue
         if (entry.content, entry.settings) == (plan.content, plan.settings):
-            is_whole = _has_reports(entry, plan) and _is_filed(entry, filed)
-            if is_whole and not (options.retry_failed and entry.failed):
+            is_again = options.retry_failed and entry.failed
+            if not is_again and _is_whole(entry, plan, filed):
                 done.add(entry.recording)
         elif entry.content == plan.content and entry.settings != plan.settings:
             others += not entry.refused
@@ -321,46 +310,48 @@ def print_alarms(rows: Iterable[Mapping[str, Cell]]) -> None:
         console.print(f"       and {len(alarms) - _SHOWN_ALARMS} more")
 
 
-REFUSALS = (HistoryError,)
-
-
-def _require_own_file(options: argparse.Namespace) -> None:
-    """Refuse a history of the name under which the rows of the output are kept."""
-    history, output = options.history, options.output[0]
-    if isinstance(history, Path) and history.resolve() == database_of(output):
-        raise ValueError(
-            f"--history {history}: --output {output} keeps its rows in a file of this name: give "
-            "one of the two another name"
-        )
-
-
 def _require_sense(options: argparse.Namespace) -> None:
     """Refuse at once options that every recording would refuse."""
-    if options.jobs is not None and options.scheduler is not None:
-        raise ValueError(
-            "--jobs applies to this machine only: with --scheduler the cluster uses its own workers"
-        )
-    if options.jobs is not None and options.jobs < 1:
-        raise ValueError(f"--jobs must be at least 1, got {options.jobs}")
+    jobs, history, plant, first = options.jobs, options.history, options.plant, options.output[0]
+    for is_refused, why in (
+        (
+            jobs is not None and options.scheduler is not None,
+            "--jobs applies to this machine only: with --scheduler the cluster uses its own "
+            "workers",
+        ),
+        (jobs is not None and jobs < 1, f"--jobs must be at least 1, got {jobs}"),
+        (
+            plant is not None and options.valve is not None,
+            "--plant: its table already describes the valves: omit --valve",
+        ),
+        (
+            history is not None and plant is None,
+            "--history stores results by tag: give the table of tags with --plant",
+        ),
+        (
+            options.first_is_baseline and history is None,
+            "--first-is-baseline: the baseline is stored in a history: give --history",
+        ),
+        (
+            isinstance(history, Path) and history.resolve() == database_of(first),
+            f"--history {history}: --output {first} keeps its rows in a file of this name: give "
+            "one of the two another name",
+        ),
+    ):
+        if is_refused:
+            raise ValueError(why)
     for output in options.output:
         writer_of(output)
         if not output.parent.is_dir():
             raise ValueError(f"{output}: there is no folder {output.parent}")
-        if output.resolve().parent != options.output[0].resolve().parent:
+        if output.resolve().parent != first.resolve().parent:
             raise ValueError(f"{output}: all outputs must lie in the folder of the first")
-    _require_own_file(options)
     reading_options(options)
     anything = ValveFile(Valve(), frozen(dict.fromkeys(FIXABLE, 1.0)))
     identification_settings(options, anything)
     survey_limits(options, anything)
     if options.valve is not None:
         read_valve_file(options.valve)
-    if options.plant is not None and options.valve is not None:
-        raise ValueError("--plant: its table already describes the valves: omit --valve")
-    if options.history is not None and options.plant is None:
-        raise ValueError("--history stores results by tag: give the table of tags with --plant")
-    if options.first_is_baseline and options.history is None:
-        raise ValueError("--first-is-baseline: the baseline is stored in a history: give --history")
 
 
 def _baselines(options: argparse.Namespace, names: Sequence[str]) -> Baselines:
@@ -410,16 +401,8 @@ def _identify(
     """
     filings: list[Filing] = []
     shown: set[str] = set()
-    console = OutputConsole(stderr=True, highlight=False, markup=False, soft_wrap=True)
-    columns = (
-        TextColumn("identifying"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeRemainingColumn(),
-    )
-    with Progress(
-        *columns, console=console, transient=True, disable=not console.is_terminal
-    ) as progress:
+    columns = (TextColumn("identifying"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with shown_progress(*columns) as progress:
         task = progress.add_task("", total=len(plans))
         for plan, rows in finished(plans, share_out, stop):
             # A later run recognizes finished recordings by these keys.
@@ -432,7 +415,7 @@ def _identify(
                 if (error := row.get("error")) and reason_of(str(error)) not in shown:
                     shown.add(reason_of(str(error)))
                     label = ", ".join(filter(None, (plan.name, str(row["valve"]))))
-                    console.print(f"{label}: {error}")
+                    progress.console.print(f"{label}: {error}")
     return filings
 
 
@@ -443,9 +426,8 @@ def _file(filings: Sequence[Filing], results: ResultsFile, options: argparse.Nam
     stale = [entry for entry in results.entries() if entry.recording in changed]
     results.keep(lambda entry: entry.recording not in changed)
     for entry in stale:
-        rows = [{**row, **filed.cells.get((entry.recording, str(row["valve"])), {})}
-                for row in entry.rows]  # fmt: skip
-        results.append(rows)
+        cells = (filed.cells.get((entry.recording, str(row["valve"])), {}) for row in entry.rows)
+        results.append([{**row, **own} for row, own in zip(entry.rows, cells, strict=True)])
     told = [f"{filed.filed} results filed in {options.history}"]
     told += [f"{filed.known} were there before"] if filed.known else []
     if filed.baselines:

@@ -12,11 +12,9 @@
 import argparse
 import json
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from rich.table import Table
 
 from valve_friction_ros.commands.arguments.recording import (
@@ -29,13 +27,12 @@ from valve_friction_ros.commands.arguments.recording import (
 )
 from valve_friction_ros.commands.console import plain_console
 from valve_friction_ros.commands.process import ExitCode, complain
-from valve_friction_ros.identification import RefusalError
+from valve_friction_ros.identification import plain
 from valve_friction_ros.outside_text import printable
 from valve_friction_ros.records.layout import Layout
 from valve_friction_ros.records.table import OpenTables, ReadSignal
 from valve_friction_ros.streams import utc_second
 
-REFUSALS = (RefusalError,)
 _DATED = 946_684_800_000_000_000
 """Time, ns since 1970, from which a stamp is taken for a date: the year 2000."""
 _GAP = 10
@@ -65,13 +62,6 @@ def _inspected(valve: str, read: ReadSignal) -> dict[str, Any]:
     }
 
 
-def _as_json(one: Mapping[str, Any]) -> dict[str, Any]:
-    return {
-        name: None if isinstance(value, float) and not np.isfinite(value) else value
-        for name, value in one.items()
-    }
-
-
 def _cells(one: Mapping[str, Any]) -> tuple[str, ...]:
     return (
         printable(one["valve"]),
@@ -86,30 +76,18 @@ def _cells(one: Mapping[str, Any]) -> tuple[str, ...]:
     )
 
 
-def _course(read: ReadSignal) -> NDArray[np.float64]:
-    """Return means of the values over equal intervals of time; nan for an empty interval."""
-    parts = min(_PARTS, read.stamps.size)
-    course = np.full(parts, np.nan)
-    if parts:
-        since = read.stamps - read.stamps[0]
-        part = np.minimum(since * parts // (int(since[-1]) + 1), parts - 1)
-        counts = np.bincount(part, minlength=parts)
-        sums = np.bincount(part, read.values, minlength=parts)
-        course[counts > 0] = sums[counts > 0] / counts[counts > 0]
-    return course
-
-
 def _picture(read: ReadSignal) -> str:
-    """Return a sketch of the signal in one line of text."""
-    course = _course(read)
-    known = np.isfinite(course)
-    if not known.any():
+    """Return a sketch of the signal in one line: its means over equal intervals of time."""
+    parts = min(_PARTS, read.stamps.size)
+    if not parts:
         return ""
-    span = float(np.ptp(course[known])) or 1.0
-    height = (course - course[known].min()) / span * (len(_BARS) - 1)
-    return "".join(
-        _BARS[round(float(one))] if there else " " for one, there in zip(height, known, strict=True)
-    )
+    since = read.stamps - read.stamps[0]
+    part = np.minimum(since * parts // (int(since[-1]) + 1), parts - 1)
+    counts = np.bincount(part, minlength=parts)
+    means = np.bincount(part, read.values, minlength=parts)[counts > 0] / counts[counts > 0]
+    height = (means - means.min()) / (float(np.ptp(means)) or 1.0) * (len(_BARS) - 1)
+    marks = iter(_BARS[round(float(one))] for one in height)
+    return "".join(next(marks) if count else " " for count in counts)
 
 
 def _print(layout: Layout, reads: list[ReadSignal], signals: list[dict[str, Any]]) -> None:
@@ -138,15 +116,15 @@ def _print(layout: Layout, reads: list[ReadSignal], signals: list[dict[str, Any]
         console.print(f"{which}: {', '.join(others)}", soft_wrap=True)
 
 
-def _draw(options: argparse.Namespace, path: Path) -> None:
+def _draw(options: argparse.Namespace) -> None:
     """Plot the recording in SI units, with the travel from a valve file."""
     from valve_friction_ros import figures  # noqa: PLC0415 - slow to import
     from valve_friction_ros.figures.record_figures import record_figure  # noqa: PLC0415
 
-    figures.require_picture_file(path)
+    figures.require_picture_file(options.plot)
     description, reading = described(options.file, options.valve, options)
     recorded = read_one(options.file, description.valve, reading)
-    figures.save_picture(record_figure(recorded.recording()), path)
+    figures.save_picture(record_figure(recorded.recording()), options.plot)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -165,7 +143,7 @@ def run(options: argparse.Namespace) -> int:
         shown = {
             "words": layout.words,
             "questions": list(layout.questions),
-            "signals": [_as_json(one) for one in signals],
+            "signals": plain(signals),
             "columns": layout.kinds,
         }
         print(json.dumps(shown, ensure_ascii=False))
@@ -176,5 +154,5 @@ def run(options: argparse.Namespace) -> int:
         return ExitCode.REFUSED
     save_columns(options, reading)
     if options.plot is not None:
-        _draw(options, options.plot)
+        _draw(options)
     return ExitCode.DONE

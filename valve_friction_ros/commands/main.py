@@ -19,7 +19,6 @@ import signal
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Protocol, cast
 
 from valve_friction_ros import __version__
 from valve_friction_ros.commands.process import (
@@ -29,9 +28,11 @@ from valve_friction_ros.commands.process import (
     complain,
     flush_output,
     has_been_interrupted,
-    interrupt_raises,
+    let_interrupt_raise,
 )
 from valve_friction_ros.commands.start import end_at_once
+from valve_friction_ros.history.place import HistoryError
+from valve_friction_ros.identification.refusal import RefusalError
 
 SUB_COMMANDS = {
     "identify": "identify the friction of a valve from a CSV file or a bag",
@@ -48,20 +49,8 @@ SUB_COMMANDS = {
     "reproduce-paper": "run the paper's programme and write a report",
     "demo": "tighten the packing of a monitored simulated valve",
 }
-"""Line in ``--help`` of each sub-command; ``identify-folder`` is the module `identify_folder`."""
-
-
-class SubCommand(Protocol):
-    """The module of a sub-command, imported only after its arguments have been parsed."""
-
-    REFUSALS: tuple[type[Exception], ...]
-    """Errors of the user's request that `run` raises besides ValueError and OSError."""
-
-    def run(self, options: argparse.Namespace) -> int:
-        """Run the sub-command with parsed `options`; return the exit code.
-
-        An error is one line on stderr.
-        """
+"""Line in ``--help`` of each sub-command. ``identify-folder`` is `run` of the module
+`identify_folder`: it takes the parsed options and returns the exit code."""
 
 
 def _chosen(arguments: Sequence[str]) -> tuple[str, list[str]]:
@@ -95,14 +84,14 @@ def _run(name: str, arguments: Sequence[str]) -> int:
     DECLARATIONS[name](parser)
     options = parser.parse_args(arguments, argparse.Namespace(command=name))
     package, _, _ = __name__.rpartition(".")
-    module = cast(SubCommand, importlib.import_module(f"{package}.{re.sub('[- ]', '_', name)}"))
-    refusals: tuple[type[Exception], ...] = (ValueError, *module.REFUSALS)
+    module = importlib.import_module(f"{package}.{re.sub('[- ]', '_', name)}")
+    let_interrupt_raise()
     try:
-        with interrupt_raises():
-            return module.run(options)
-    except refusals as error:
+        code: int = module.run(options)
+    except (ValueError, RefusalError, HistoryError) as error:
         complain(name, error)
         return ExitCode.REFUSED
+    return code
 
 
 def run(arguments: Sequence[str]) -> int:

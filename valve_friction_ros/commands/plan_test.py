@@ -13,27 +13,24 @@ import argparse
 import json
 import math
 import shlex
-import sys
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from valve_friction_ros.commands.arguments import require_outputs
 from valve_friction_ros.commands.arguments.planning import frictions_from, planned_settings
-from valve_friction_ros.commands.console import OutputConsole, plain_console
+from valve_friction_ros.commands.console import plain_console, shown_progress
 from valve_friction_ros.commands.process import ExitCode
-from valve_friction_ros.history import HistoryError
-from valve_friction_ros.identification import SLIDING, UNITS, RefusalError, percentage, plain
+from valve_friction_ros.identification import SLIDING, UNITS, percentage, plain
 from valve_friction_ros.planning import (
     Conditions,
     Limits,
     StrokePlan,
     plan_remarks,
     plan_test,
-    set_points,
 )
 from valve_friction_ros.planning.search import Forecast
 from valve_friction_ros.planning.steps import (
@@ -41,11 +38,12 @@ from valve_friction_ros.planning.steps import (
     FINEST_PRESSURE,
     ShownUnit,
     form_of,
+    set_points,
     stem_limits,
     table_of,
 )
 from valve_friction_ros.records.files import write_whole
-from valve_friction_ros.records.units import LENGTH, PRESSURE, span
+from valve_friction_ros.records.units import POSITION_UNITS, PRESSURE_UNITS, span
 from valve_friction_ros.records.valve_file import read_valve_file
 from valve_friction_ros.wording import number_and_width
 
@@ -113,17 +111,12 @@ def _forecast_json(name: str, one: Forecast, travel: float) -> dict[str, Any]:
 
 def as_json(plan: StrokePlan, path: Path) -> dict[str, Any]:
     """Build the JSON object in SI units."""
-    pattern = plan.test.pattern
     return {
         "file": str(path),
         "aim": plan.aim,
         "duration": plan.test.duration,
         "cycles": plan.test.cycles,
-        "pattern": {
-            "shapes": [*pattern.shapes],
-            "speeds": [*pattern.speeds],
-            "hold": pattern.hold,
-        },
+        "pattern": plain(vars(plan.test.pattern)),
         "start_pressure": float(plan.test.pressures[0]),
         "pressure_range": [plan.band.low, plan.band.high],
         "pressure_rate": plan.test.largest_rate,
@@ -134,13 +127,9 @@ def as_json(plan: StrokePlan, path: Path) -> dict[str, Any]:
         ],
         "tried": plan.tried,
         "warnings": [*plan_remarks(plan)],
-        "play": _plain(player(plan, path)),
-        "play_on_bench": _plain(player(plan, path, on_bench=True)),
+        "play": plain(player(plan, path)),
+        "play_on_bench": plain(player(plan, path, on_bench=True)),
     }
-
-
-def _plain(values: dict[str, Any]) -> dict[str, Any]:
-    return {name: plain(one) if isinstance(one, float) else one for name, one in values.items()}
 
 
 def _cell(one: Forecast, name: str) -> str:
@@ -233,15 +222,12 @@ def _parameters(values: dict[str, Any]) -> str:
 
 def _units(options: argparse.Namespace) -> tuple[ShownUnit, ShownUnit]:
     """Return the units of pressure and position in output for people."""
-    sizes = PRESSURE[options.pressure_unit], LENGTH[options.position_unit]
+    sizes = PRESSURE_UNITS[options.pressure_unit], POSITION_UNITS[options.position_unit]
     pressure, position = (size.multiplier / size.divisor for size in sizes)
     return (
         ShownUnit(options.pressure_unit, pressure, FINEST_PRESSURE),
         ShownUnit(options.position_unit, position, FINEST_POSITION),
     )
-
-
-REFUSALS = (RefusalError, HistoryError)
 
 
 def _planned(options: argparse.Namespace) -> StrokePlan:
@@ -255,15 +241,8 @@ def _planned(options: argparse.Namespace) -> StrokePlan:
         options.pressure_noise_pa,
         options.converter_lag,
     )
-    with Progress(
-        TextColumn("comparing stroke tests"),
-        BarColumn(),
-        TaskProgressColumn(),
-        TimeElapsedColumn(),
-        console=OutputConsole(stderr=True),
-        transient=True,
-        disable=not sys.stderr.isatty(),
-    ) as bar:
+    words = TextColumn("comparing stroke tests")
+    with shown_progress(words, BarColumn(), TaskProgressColumn(), TimeElapsedColumn()) as bar:
         task = bar.add_task("", total=1.0)
         return plan_test(
             described.valve,
@@ -284,7 +263,7 @@ def run(options: argparse.Namespace) -> int:
             raise ValueError(f"{path}: it exists already: give another name, or --replace")
     require_outputs(*files, picture=options.figure)
     plan = _planned(options)
-    signal = span(options.signal_range, PRESSURE) if options.signal_range else None
+    signal = span(options.signal_range, PRESSURE_UNITS) if options.signal_range else None
     texts = {}
     if options.table is not None or options.form is not None:
         steps = set_points(plan, signal)

@@ -20,8 +20,6 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
 from enum import IntEnum
 from pathlib import Path
 from types import FrameType
@@ -141,13 +139,11 @@ def _interrupt_again(unraisable: "sys.UnraisableHookArgs") -> None:
         sys.__unraisablehook__(unraisable)
 
 
-@contextmanager
-def interrupt_raises() -> Iterator[None]:
-    """Let Ctrl-C raise KeyboardInterrupt instead of ending the process at once."""
+def let_interrupt_raise() -> None:
+    """Let Ctrl-C raise KeyboardInterrupt from now on, instead of ending the process at once."""
     if signal.getsignal(signal.SIGINT) is end_at_once:
         signal.signal(signal.SIGINT, _interrupt)
         sys.unraisablehook = _interrupt_again
-    yield
 
 
 def requests_raise() -> None:

@@ -14,10 +14,6 @@ import importlib
 import sys
 from pathlib import Path
 
-from valve_friction_ros.identification import RefusalError
-
-REFUSALS = (RefusalError,)
-
 
 def _examples() -> Path:
     """Find the folder of the examples, in the sources or in the installation."""

@@ -29,8 +29,6 @@ from valve_friction_ros.model import Valve
 from valve_friction_ros.outside_text import printable
 from valve_friction_ros.wording import percentage
 
-REFUSALS = (RefusalError,)
-
 
 def _poor(validation: Validation, least: float) -> str:
     """Return a message on a poor fit with the remedy; empty if the fit is good."""

@@ -163,9 +163,9 @@ def plan_figure(plan: StrokePlan) -> Figure:
         np.resize(COLOURS, len(plan.frictions.draws)),
         strict=True,
     ):
-        motion = moved(test.excitation, test.duration, plan.valve, draw, plan.conditions)
-        time = np.arange(motion.pressure.size) * motion.sample_period
-        stem.plot(time, 100 * motion.stem.position / travel, color=colour, label=f"friction {name}")
+        record, _ = moved(test.excitation, test.duration, plan.valve, draw, plan.conditions)
+        percent = 100 * record.position / travel
+        stem.plot(record.time, percent, color=colour, label=f"friction {name}")
     for share, label in ((plan.limits.lowest, "part of the travel"), (plan.limits.highest, None)):
         stem.axhline(100 * share, color="0.5", lw=0.8, ls="--", label=label)
     stem.set_ylabel("expected stem [% of travel]")

@@ -38,7 +38,7 @@ from valve_friction_ros.records.files import (
     walk,
 )
 from valve_friction_ros.records.header_words import named
-from valve_friction_ros.records.table import OpenTable
+from valve_friction_ros.records.table import layout_of
 from valve_friction_ros.records.table_rows import encoding_of
 from valve_friction_ros.records.valve_description import QUESTIONS, valve_description
 from valve_friction_ros.records.valve_file import ValveFile, valve_file_of
@@ -329,9 +329,9 @@ def _is_part(found: FoundRecording, valve: ValveFile) -> bool:
     """Return whether a table holds only one signal, too few to identify a valve."""
     try:
         with on_disk(found.path) as path:
-            if is_bag(path) or OpenTable(path, valve.columns).layout.valves:
+            if is_bag(path) or layout_of(path, valve.columns).valves:
                 return False
-            layout = OpenTable(path, valve.columns, is_part=True).layout
+            layout = layout_of(path, valve.columns, is_part=True)
     except (ValueError, OSError):
         return False  # reading it later gives the cause
     signals = {one.name for group in layout.valves.values() for one in group}
@@ -378,7 +378,7 @@ def valves_of(
     if tag := _tag_of(name, plant):
         return [("", tag, plant[tag])]
     if is_table:
-        layout = OpenTable(path, Columns()).layout
+        layout = layout_of(path, Columns())
         labels = [label for label in layout.valves if label]
         by_label = [(label, _tags_named([label], plant)) for label in labels]
         if by_label and all(len(tags) == 1 for _, tags in by_label):

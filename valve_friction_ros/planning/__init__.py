@@ -24,15 +24,8 @@ if TYPE_CHECKING:
         plan_remarks as plan_remarks,
         plan_test as plan_test,
     )
-    from valve_friction_ros.planning.steps import (
-        SetPoint as SetPoint,
-        set_points as set_points,
-        signal_range as signal_range,
-    )
     from valve_friction_ros.planning.stroke_test import (
         FrictionRange as FrictionRange,
-        Pattern as Pattern,
-        StrokeTest as StrokeTest,
         known_friction as known_friction,
         unknown_friction as unknown_friction,
     )

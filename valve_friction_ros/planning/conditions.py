@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 from valve_friction_ros.identification import SLIDING
-from valve_friction_ros.model.checks import require_finite, require_non_negative, require_positive
+from valve_friction_ros.model.checks import require_non_negative, require_positive
 from valve_friction_ros.model.drive import DEFAULT_LAG
 
 _FRICTION = ("coulomb_friction", "viscous_friction", "static_friction")
@@ -27,6 +27,10 @@ AIMS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     }
 )
 """Aims of a test: the numbers whose intervals matter."""
+
+STOP_MARGIN = 0.05
+"""Share of the travel that a stem without any friction keeps from either stop: an allowance for an
+uncertain spring."""
 
 
 @dataclass(frozen=True)
@@ -45,11 +49,8 @@ class Limits:
         Largest rate of the pressure, Pa/s.
     pressure_minimum, pressure_maximum : float
         Pressures that may be set, Pa.
-    stop_margin : float
-        Share of the travel that a stem without any friction would keep from either stop: an
-        allowance for an uncertain spring.
     allow_stops : bool
-        Whether the stem may reach seat and stop.
+        Whether the stem may reach seat and stop; otherwise it keeps `STOP_MARGIN` from them.
 
     Raises
     ------
@@ -64,17 +65,11 @@ class Limits:
     pressure_rate: float = math.inf
     pressure_minimum: float = -math.inf
     pressure_maximum: float = math.inf
-    stop_margin: float = 0.05
     allow_stops: bool = False
 
     def __post_init__(self) -> None:
         """Refuse impossible limits."""
-        if (
-            not 0
-            <= require_finite("lowest", self.lowest)
-            < require_finite("highest", self.highest)
-            <= 1
-        ):
+        if not 0 <= self.lowest < self.highest <= 1:
             raise ValueError(
                 "the part of the travel must be given from low to high within 0 to 100 %, got "
                 f"{100 * self.lowest:g} % to {100 * self.highest:g} %"
@@ -88,8 +83,6 @@ class Limits:
                 f"pressure_minimum ({self.pressure_minimum:g}) must be below "
                 f"pressure_maximum ({self.pressure_maximum:g})"
             )
-        if not 0 <= self.stop_margin < 0.5:
-            raise ValueError(f"stop_margin must be at least 0 and below 0.5: {self.stop_margin:g}")
 
 
 @dataclass(frozen=True)

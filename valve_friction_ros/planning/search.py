@@ -16,7 +16,7 @@ say what the people who play the test must know.
 import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,7 +32,7 @@ from valve_friction_ros.identification.trust.uncertainty import mean_sliding_fri
 from valve_friction_ros.identification.trust.verdict import FALL_SPEED
 from valve_friction_ros.model.excitations import Excitation
 from valve_friction_ros.model.recording import Recording, SensorNoise, converter_response
-from valve_friction_ros.model.simulation import Trajectory, simulate
+from valve_friction_ros.model.simulation import simulate
 from valve_friction_ros.model.valve import KarnoppParameters, Valve
 from valve_friction_ros.planning.conditions import AIMS, Conditions, Limits
 from valve_friction_ros.planning.stroke_test import (
@@ -43,7 +43,6 @@ from valve_friction_ros.planning.stroke_test import (
     PressureBand,
     StrokeTest,
     frictionless_reach,
-    lowest_pressure,
     pressure_band,
     stroke,
     stroke_test,
@@ -53,33 +52,12 @@ _MOST_SAMPLES = 12_000
 """Most samples that a forecast simulates: fewer samples with less noise give the same intervals."""
 
 
-@dataclass(frozen=True, eq=False)
-class SimulatedTest:
-    """A simulated test.
-
-    Attributes
-    ----------
-    sample_period : float
-        Time between two samples, s.
-    pressure : ndarray of float, shape (n,)
-        Pressure behind the converter, Pa.
-    stem : Trajectory
-        Position and velocity of the stem.
-    """
-
-    sample_period: float
-    pressure: NDArray[np.float64] = field(repr=False)
-    stem: Trajectory = field(repr=False)
-
-
 @dataclass(frozen=True)
 class Forecast:
-    """Forecast for one valve: its motion, and the intervals of its parameters.
+    """Forecast for the valve with these `parameters`: its motion, and the intervals.
 
     Attributes
     ----------
-    parameters : KarnoppParameters
-        The valve.
     values, half_widths : mapping of str to float
         True values, and half the widths of their 95 % intervals; SI units. No widths if refused.
     reach : tuple of float
@@ -112,18 +90,22 @@ def moved(
     valve: Valve,
     parameters: KarnoppParameters,
     conditions: Conditions,
-) -> SimulatedTest:
-    """Simulate a valve under a signal of a converter, without noise."""
+) -> tuple[Recording, NDArray[np.float64]]:
+    """Simulate a valve under a signal of a converter, without noise.
+
+    Return pressure behind the converter and stem position, and the velocity of the stem, m/s.
+    """
     samples = duration * conditions.sample_rate
     stride = max(math.ceil(samples / _MOST_SAMPLES), 1)
     period = stride / conditions.sample_rate
     time = np.arange(math.floor(duration / period + 1e-9) + 1) * period
     pressure = converter_response(excitation.sample(time), period, conditions.converter_lag)
-    return SimulatedTest(period, pressure, simulate(valve, parameters, pressure, period))
+    stem = simulate(valve, parameters, pressure, period)
+    return Recording(period, pressure, stem.position), stem.velocity
 
 
 def forecast(
-    motion: SimulatedTest,
+    motion: tuple[Recording, NDArray[np.float64]],
     valve: Valve,
     parameters: KarnoppParameters,
     conditions: Conditions,
@@ -131,37 +113,36 @@ def forecast(
     *,
     with_competitors: bool = False,
 ) -> Forecast:
-    """Predict what the identification will determine from a simulated test.
+    """Predict what the identification will determine from a simulated test, as `moved` returns it.
 
     The noise is one realisation of the sensors' noise, the same for each test: the width of an
     interval hardly depends on it.
     """
-    period, pressure, stem = motion.sample_period, motion.pressure, motion.stem
-    fewer = math.sqrt(1.0 / (period * conditions.sample_rate))
+    exact, velocity = motion
+    fewer = math.sqrt(1.0 / (exact.sample_period * conditions.sample_rate))
     noise = SensorNoise(conditions.position_noise * fewer, conditions.pressure_noise * fewer, 0)
-    record = noise.applied_to(Recording(period, pressure, stem.position))
     refusal, widths = "", {}
     try:
         widths = dict(
             expected_half_widths(
-                record,
+                noise.applied_to(exact),
                 valve,
                 parameters,
                 settings,
-                start=float(stem.position[0]),
+                start=float(exact.position[0]),
                 with_competitors=with_competitors,
             )
         )
     except RefusalError as error:
         refusal = str(error)
-    values = {**vars(parameters), SLIDING: mean_sliding_friction(parameters, stem.velocity)}
+    values = {**vars(parameters), SLIDING: mean_sliding_friction(parameters, velocity)}
     return Forecast(
         parameters,
         values,
         widths,
-        (float(stem.position.min()), float(stem.position.max())),
-        float(np.max(np.abs(stem.velocity))),
-        int(np.count_nonzero((stem.velocity[1:] != 0) & (stem.velocity[:-1] == 0))),
+        (float(exact.position.min()), float(exact.position.max())),
+        float(np.max(np.abs(velocity))),
+        int(np.count_nonzero((velocity[1:] != 0) & (velocity[:-1] == 0))),
         refusal,
     )
 
@@ -186,24 +167,14 @@ _REFUSAL_LOSS = 3.0
 
 @dataclass(frozen=True)
 class StrokePlan:
-    """A stroke test with its forecasts.
+    """A stroke test with its forecasts, and what it was planned for.
 
     Attributes
     ----------
-    test : StrokeTest
-        The pressure.
-    valve : Valve
-        Geometry.
     band : PressureBand
         Pressures between which it moves.
-    frictions : FrictionRange
-        The valves for which it is planned.
     forecasts : tuple of Forecast
-        Forecast for each valve.
-    limits : Limits
-        Limits that it keeps to.
-    conditions : Conditions
-        Conditions of its measurement.
+        Forecast for each valve of `frictions`.
     aim : str
         Its aim, one of `AIMS`.
     tried : int
@@ -262,15 +233,6 @@ class _Search:
 
     def test(self, pattern: Pattern) -> StrokeTest | None:
         return stroke_test(pattern, self.band, self.limits.duration)
-
-    def forecasts(
-        self, test: StrokeTest, progress: Callable[[float], object]
-    ) -> Iterator[Forecast]:
-        """Forecast each friction, and report the last tenth of the work."""
-        count = len(self.frictions.draws)
-        for place in range(count):
-            yield self.forecast(test, place, is_final=True)
-            progress(0.9 + 0.1 * (place + 1) / count)
 
     def forecast(self, test: StrokeTest, place: int, is_final: bool = False) -> Forecast:
         draw = self.frictions.draws[place]
@@ -413,12 +375,16 @@ def plan_test(
     told = progress or (lambda _: None)
     test = found.test(found.best(told))
     assert test is not None  # noqa: S101 - it was simulated
+    forecasts: list[Forecast] = []
+    for place in range(len(frictions.draws)):
+        forecasts.append(found.forecast(test, place, is_final=True))
+        told(0.9 + 0.1 * len(forecasts) / len(frictions.draws))
     plan = StrokePlan(
         test,
         valve,
         found.band,
         frictions,
-        tuple(found.forecasts(test, told)),
+        tuple(forecasts),
         limits,
         conditions,
         aim,
@@ -457,7 +423,7 @@ def _resting(plan: StrokePlan) -> Iterator[str]:
 def _reaches(plan: StrokePlan) -> Iterator[str]:
     """Yield remarks that the stem may leave, or not reach the end of, its part of the travel."""
     valve, limits = plan.valve, plan.limits
-    if plan.band.low <= lowest_pressure(valve):
+    if plan.band.low <= valve.pressure_reference:
         yield (
             f"the lower end is atmospheric pressure, {plan.band.low / 1e3:.4g} kPa "
             "(pressure_reference): the stem may not reach the lower end of the part of the travel"
@@ -484,6 +450,7 @@ def _reaches(plan: StrokePlan) -> Iterator[str]:
 
 
 def _speeds(plan: StrokePlan) -> Iterator[str]:
+    """Yield remarks on jumps, and on speeds that the test does not reach."""
     fastest = max(one.top_speed for one in plan.forecasts)
     if fastest > _FASTER_RATIO * plan.limits.speed:
         yield (
@@ -499,6 +466,7 @@ def _speeds(plan: StrokePlan) -> Iterator[str]:
 
 
 def _unknown_parameters(plan: StrokePlan) -> Iterator[str]:
+    """Yield remarks on numbers of the aim that the test determines badly, or may."""
     for name in AIMS[plan.aim]:
         share = plan.likely.relative(name)
         if share <= _UNKNOWN_REL_HALF_WIDTH:
@@ -508,13 +476,11 @@ def _unknown_parameters(plan: StrokePlan) -> Iterator[str]:
         if name == "viscous_friction":
             remedy = (
                 "its delay F_v/k cannot be distinguished from a lag of the signals: set a smaller "
+                "timing_uncertainty if the clocks allow it"
             )
-            remedy += "timing_uncertainty if the clocks allow it"
         yield f"{name} {why}: {remedy}"
-
-
-def _model(one: Forecast) -> Iterator[str]:
-    if one.parameters.static_friction > one.parameters.coulomb_friction:
+    packing = plan.likely.parameters
+    if packing.static_friction > packing.coulomb_friction:
         yield (
             "if friction falls gradually with speed (Stribeck), the intervals of F_c, F_v and F_s "
             "will be several times wider than predicted"
@@ -523,10 +489,4 @@ def _model(one: Forecast) -> Iterator[str]:
 
 def plan_remarks(plan: StrokePlan) -> tuple[str, ...]:
     """Return a sentence for each fact to know before a test is played."""
-    return (
-        *_resting(plan),
-        *_reaches(plan),
-        *_speeds(plan),
-        *_unknown_parameters(plan),
-        *_model(plan.likely),
-    )
+    return (*_resting(plan), *_reaches(plan), *_speeds(plan), *_unknown_parameters(plan))

@@ -16,10 +16,8 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.planning.played_test import PRESSURE_MARGIN
 from valve_friction_ros.planning.search import StrokePlan
-from valve_friction_ros.planning.stroke_test import FrictionRange
 from valve_friction_ros.wording import two_digits
 
 _LOW_CURRENT, _CURRENT_SPAN = 4.0, 16.0
@@ -31,17 +29,7 @@ _QUICK = 0.9
 
 
 class ShownUnit(NamedTuple):
-    """A unit of set points and limits.
-
-    Attributes
-    ----------
-    name : str
-        Name, such as ``psi``.
-    size : float
-        Size in SI.
-    finest : float
-        Resolution to which a value is shown, in SI.
-    """
+    """A unit of set points and limits: its size, and the resolution of shown values, both in SI."""
 
     name: str
     size: float
@@ -59,16 +47,8 @@ class ShownUnit(NamedTuple):
 
 FINEST_PRESSURE, FINEST_POSITION = 1.0, 1e-5
 """Resolution of set points and limits in a table, Pa and m. Chosen: finer than any converter."""
-KPA, MM = ShownUnit("kPa", 1e3, FINEST_PRESSURE), ShownUnit("mm", 1e-3, FINEST_POSITION)
-
-
-def signal_range(valve: Valve, frictions: FrictionRange) -> tuple[float, float]:
-    """Return the pressures of 0 and 100 %, Pa: those between which the spring alone moves the stem.
-
-    A positioner's set point in percent is then the position of a stem without friction.
-    """
-    constant, preload = frictions.spring
-    return valve.actuator_drive(preload), valve.actuator_drive(preload + constant * valve.travel)
+_STEM_MARGIN = 0.05
+"""Share of the travel beside the reach of all planned valves at which a test is aborted. Chosen."""
 
 
 @dataclass(frozen=True)
@@ -79,15 +59,13 @@ class SetPoint:
     ----------
     time, duration : float
         Beginning and length, s.
-    pressure : float
-        Pressure at its end, Pa.
-    share : float
-        `pressure` as a share of the signal's range.
+    pressure, share : float
+        Pressure at its end, Pa, and the same as a share of the signal's range.
     stem : tuple of float
         Shares of the travel between which the stem must be from then on until the next step ends:
         beyond them the test is aborted.
     tells : str
-        Purpose of the step.
+        Purpose.
     """
 
     time: float
@@ -117,48 +95,42 @@ def _tells(before: float, now: float, after: float, largest: float) -> str:
     return "; ".join(words)
 
 
-def stem_limits(plan: StrokePlan, margin: float = 0.05) -> tuple[float, float]:
-    """Return the limits of the stem at which a test is aborted, shares of the travel.
-
-    They leave a `margin`, a share of the travel, beside the reach of all planned valves.
-    """
+def stem_limits(plan: StrokePlan) -> tuple[float, float]:
+    """Return the limits of the stem at which a test is aborted, shares of the travel."""
     lows, highs = zip(*(one.reach for one in plan.forecasts), strict=True)
     travel = plan.valve.travel
-    return max(min(lows) / travel - margin, 0.0), min(max(highs) / travel + margin, 1.0)
+    lowest, highest = min(lows) / travel - _STEM_MARGIN, max(highs) / travel + _STEM_MARGIN
+    return max(lowest, 0.0), min(highest, 1.0)
 
 
-def set_points(
-    plan: StrokePlan, signal: tuple[float, float] | None = None, margin: float = 0.05
-) -> tuple[SetPoint, ...]:
+def set_points(plan: StrokePlan, signal: tuple[float, float] | None) -> tuple[SetPoint, ...]:
     """Return the steps of a planned test.
 
     Parameters
     ----------
     plan : StrokePlan
         The test.
-    signal : tuple of float, optional
-        Pressures of a signal of 0 and 100 %, Pa; by default `signal_range`.
-    margin : float
-        Margin of `stem_limits`.
+    signal : tuple of float or None
+        Pressures of a signal of 0 and 100 %, Pa. None: those between which the spring alone moves
+        the stem; a positioner's set point is then the position of a stem without friction.
 
     Raises
     ------
     ValueError
         If the signal's range does not hold the pressures of the test.
     """
-    low, high = signal or signal_range(plan.valve, plan.frictions)
-    if not low < high:
-        raise ValueError(
-            f"the range of the signal must be given from low to high, got {low:g} to {high:g} Pa"
-        )
-    test, stem = plan.test, stem_limits(plan, margin)
+    constant, preload = plan.frictions.spring
+    by_spring = (preload, preload + constant * plan.valve.travel)
+    low, high = signal or map(plan.valve.actuator_drive, by_spring)
+    test, stem = plan.test, stem_limits(plan)
     times, pressures = test.times.tolist(), test.pressures.tolist()
     span = plan.band.high - plan.band.low
     rates = [
         0.0 if abs(after - before) < _LEVEL * span else (after - before) / (end - begin)
         for (begin, before), (end, after) in itertools.pairwise(zip(times, pressures, strict=True))
     ]
-    steps = [SetPoint(0.0, 0.0, pressures[0], _share(pressures[0], low, high), stem, "start")]
+    shares = [(pressure - low) / (high - low) for pressure in pressures]
+    steps = [SetPoint(0.0, 0.0, pressures[0], shares[0], stem, "start")]
     moving = 0.0
     for place, rate in enumerate(rates):
         after = rates[place + 1] if place + 1 < len(rates) else 0.0
@@ -167,7 +139,7 @@ def set_points(
                 times[place],
                 times[place + 1] - times[place],
                 pressures[place + 1],
-                _share(pressures[place + 1], low, high),
+                shares[place + 1],
                 stem,
                 _tells(moving, rate, after, test.largest_rate),
             )
@@ -182,15 +154,8 @@ def set_points(
     return tuple(steps)
 
 
-def _share(pressure: float, low: float, high: float) -> float:
-    return (pressure - low) / (high - low)
-
-
 def table_of(
-    steps: tuple[SetPoint, ...],
-    plan: StrokePlan,
-    pressure: ShownUnit = KPA,
-    position: ShownUnit = MM,
+    steps: tuple[SetPoint, ...], plan: StrokePlan, pressure: ShownUnit, position: ShownUnit
 ) -> str:
     """Write set points as a table (CSV): s, %, mA, pressure, limits of the stem, purpose."""
     travel = plan.valve.travel
@@ -218,8 +183,8 @@ def form_of(
     steps: tuple[SetPoint, ...],
     plan: StrokePlan,
     tag: str,
-    pressure: ShownUnit = KPA,
-    position: ShownUnit = MM,
+    pressure: ShownUnit,
+    position: ShownUnit,
 ) -> str:
     """Write a form of a partial-stroke test for a person: before, limits, steps, after."""
     travel, (low, high) = plan.valve.travel, steps[0].stem
@@ -268,4 +233,5 @@ def _first_return(steps: tuple[SetPoint, ...]) -> float:
     lowest = min(one.share for one in steps)
     highest = max(one.share for one in steps)
     reached = [one for one in steps if one.share in (lowest, highest)]
-    return reached[min(1, len(reached) - 1)].time + reached[min(1, len(reached) - 1)].duration
+    first = reached[:2][-1]
+    return first.time + first.duration

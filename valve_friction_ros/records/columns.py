@@ -17,22 +17,11 @@ from dataclasses import dataclass, field, fields
 from typing import Any
 
 from valve_friction_ros.outside_text import nearest
-from valve_friction_ros.records.units import (
-    FORCE_UNITS,
-    NANOSECONDS,
-    POSITION_UNITS,
-    PRESSURE,
-    PRESSURE_UNITS,
-    SHARES,
-    span,
-    unit_named,
-)
+from valve_friction_ros.records.units import PRESSURE_UNITS, SHARES, UNITS, span, unit_named
 
 KNOWN_UNITS: Mapping[str, tuple[str, ...]] = {
-    "time": (*NANOSECONDS,),
-    "position": (*POSITION_UNITS, *SHARES),
-    "pressure": (*PRESSURE_UNITS, *SHARES),
-    "force": (*FORCE_UNITS,),
+    quantity: (*units, *(SHARES if quantity in ("position", "pressure") else ()))
+    for quantity, units in UNITS.items()
 }
 """Names of the permitted units by quantity."""
 
@@ -127,7 +116,7 @@ class Columns:
                 f"opposing_area_ratio must be above 0 and at most 2, got {self.opposing_area_ratio}"
             )
         if self.pressure_range:
-            span(self.pressure_range, PRESSURE)
+            span(self.pressure_range, PRESSURE_UNITS)
         if not 0 <= self.maximum_bad_share < 1:
             raise ValueError(
                 f"maximum_bad_share must be from 0 to below 1, got {self.maximum_bad_share:g}"

@@ -10,22 +10,14 @@
 """Interpretation of headers, tags and cells: quantity, unit and valve; number and unit."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from valve_friction_ros.records.units import (
-    FORCE_UNITS,
-    NANOSECONDS,
-    POSITION_UNITS,
-    PRESSURE_UNITS,
-    SHARES,
-    Unit,
-    unit_named,
-)
+from valve_friction_ros.records.units import KNOWN, SHARES, UNITS, unit_named
 
 _WORDS = {
     "time": "time zeit timestamp stamp datetime date datum uhrzeit zeitstempel tstamp elapsed",
@@ -63,14 +55,6 @@ _VAGUE = frozenset(("in", "h", "d", "m", "s", "n", "pu"))
 _IDLE = frozenset(["pv", "x", "t", "state", "fluid", "msg", "data"])
 """Words that denote neither a quantity nor a valve."""
 
-UNITS: dict[str, Mapping[str, Unit]] = {
-    "time": {name: Unit(size, 1e9) for name, size in NANOSECONDS.items()},
-    "position": POSITION_UNITS,
-    "pressure": PRESSURE_UNITS,
-    "force": FORCE_UNITS,
-}
-_KNOWN = {*SHARES}.union(*UNITS.values())
-
 
 class Named(NamedTuple):
     """Meaning of a header or a tag.
@@ -102,7 +86,7 @@ def plain_name(text: str) -> str:
 def known_unit(text: str) -> str:
     """Return the unit named by a text, or ''."""
     unit = unit_named(text)
-    return unit if unit in _KNOWN else ""
+    return unit if unit in KNOWN else ""
 
 
 def _unit_and_rest(text: str) -> tuple[str, str]:

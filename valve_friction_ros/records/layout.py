@@ -39,24 +39,17 @@ def quoted(text: str) -> str:
 
 @dataclass(frozen=True)
 class TableSignal:
-    """Location of a signal in a table: its values, times and qualities.
+    """Location of a signal in the table `path`: the columns of its values, times and qualities.
 
     Attributes
     ----------
-    quantity : str
-        ``position``, ``pressure`` or ``force``.
-    name : str
-        Header, or tag if each row has one value.
-    unit : str
-        Unit of the values.
-    place : int
-        Column of the values.
+    quantity, name : str
+        ``position``, ``pressure`` or ``force``; and the header, or the tag if each row has one
+        value.
+    place, quality : int
+        Columns of the values and of the qualities, if there are any.
     time : tuple of int
         Column of the times, or columns of days and times of day.
-    quality : int or None
-        Column of the qualities.
-    path : Path
-        File of the table.
     """
 
     quantity: str
@@ -70,16 +63,12 @@ class TableSignal:
 
 @dataclass(frozen=True, eq=False)
 class Layout:
-    """Instructions for reading a table.
+    """Instructions for reading the table `raw`.
 
     Attributes
     ----------
-    raw : RawTable
-        The cells of the table.
     form : Columns
         Given and recognized format: with it the next table is read in the same way.
-    headers : tuple of str
-        Names of all columns.
     first, above : int
         Row of the first values, numbered as in a spreadsheet, and the number of lines above it.
     valves : mapping of str to tuple of TableSignal
@@ -91,8 +80,6 @@ class Layout:
         Column of the tags if each row has one value.
     good : mapping of int to callable
         Functions that recognize good qualities, by column.
-    decimal : str
-        Decimal mark.
     texts : tuple of str
         All texts above the values, and the tags: they may name the valve.
     kinds : mapping of str to str

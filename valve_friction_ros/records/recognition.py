@@ -104,7 +104,7 @@ class _Recognition(Look):
         if len(numeric) == 1 or (numeric and self._are_pairs(numeric)):
             return [(column.place,) for column in numeric]
         possible = [one for one in self.of_kind("number", "") if not one.said.unit]
-        self._ask_column("time", numeric or possible)
+        self._ask_name("time", [one.name for one in numeric or possible])
         return []
 
     def _written(self) -> list[SeenColumn]:
@@ -225,7 +225,7 @@ class _Recognition(Look):
         found = [one for one in numeric if one.said.quantity == "value"] or numeric
         if len(found) == 1:
             return found[0].place
-        self._ask_column("value", found)
+        self._ask_name("value", [one.name for one in found])
         return -1
 
     def _find_tags(self, times: set[int]) -> None:
@@ -237,7 +237,7 @@ class _Recognition(Look):
         elif not self.of_kind("number", "value"):
             return
         if len(texts) > 1:
-            self._ask_column("tag", texts)
+            self._ask_name("tag", [one.name for one in texts])
         if len(texts) != 1:
             return
         self.tag_place = texts[0].place
@@ -260,9 +260,6 @@ class _Recognition(Look):
                     f"{self.raw.path}: more than {_MOST_TAGS} tags: name the --tag-column"
                 )
         return list(found)
-
-    def _ask_column(self, quantity: str, among: Sequence[SeenColumn]) -> None:
-        self._ask_name(quantity, [column.name for column in among])
 
     def _ask_name(self, quantity: str, among: Sequence[str]) -> None:
         listed = " or ".join(shlex.quote(name) for name in among[:_MOST_CHOICES])

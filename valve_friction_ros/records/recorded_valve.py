@@ -20,12 +20,10 @@ from valve_friction_ros.streams.samples import nanoseconds
 
 @dataclass(frozen=True, eq=False)
 class RecordedValve:
-    """The recording of one valve, or the reason why there is none.
+    """The recording of one valve in the file or folder `path`, or the reason why there is none.
 
     Attributes
     ----------
-    path : Path
-        The file or folder of the recording.
     name : str
         Namespace of the valve in a bag; empty for a file that does not name its valve.
     outcome : Recording or RefusalError

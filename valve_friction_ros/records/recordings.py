@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.model.drive import Drive
+from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.records.bags.topics import TopicChoice, bag_libraries, is_bag
 from valve_friction_ros.records.columns import Columns
@@ -29,7 +30,6 @@ from valve_friction_ros.records.table_rows import readable
 from valve_friction_ros.records.units import (
     FORCE_UNITS,
     POSITION_UNITS,
-    PRESSURE,
     PRESSURE_UNITS,
     SHARES,
     span,
@@ -65,7 +65,7 @@ def _pressure(read: ReadSignal, valve: Valve, form: Columns) -> NDArray[np.float
     unit = read.signal.unit
     if unit in SHARES:
         low, high = (
-            span(form.pressure_range, PRESSURE)
+            span(form.pressure_range, PRESSURE_UNITS)
             if form.pressure_range
             else (valve.pressure_minimum, valve.pressure_maximum)
         )
@@ -115,90 +115,11 @@ def _drive(
     return drive, Drive.PRESSURE
 
 
-def holds_a_force(path: Path, form: Columns, beside: Sequence[Path] = ()) -> bool:
-    """Return whether the drive in the table or tables of a valve is a force, not a pressure.
-
-    Raises ValueError if a file cannot be read or leaves a question open.
-    """
-    table = OpenTables((path, *beside), form)
-    table.require_settled()
-    signals = (signal for group in table.layout.valves.values() for signal in group)
-    return any(signal.quantity == "force" for signal in signals)
-
-
-def read_table(
-    path: Path,
-    valve: Valve,
-    form: Columns | None = None,
-    stretch: Stretch | None = None,
-    name: str | None = None,
-    beside: Sequence[Path] = (),
-) -> tuple[RecordedValve, ...]:
-    """Read the recordings of pressure, or force, and stem position of all valves in a table.
-
-    The samples are resampled like those of topics, with stamps in whole nanoseconds, so that a
-    recording gives the same numbers from a file and from topics.
-
-    Parameters
-    ----------
-    path : Path
-        The file; its first bytes determine its format.
-    valve : Valve
-        Gives the range of the sensor, and the travel for positions in percent. A diaphragm converts
-        a force in the file to a pressure.
-    form : Columns, optional
-        Format that the file does not state itself. If a file has both pressure and force, the
-        pressure is read.
-    stretch : Stretch, optional
-        The part to read; errors outside it do not matter.
-    name : str, optional
-        Read only this valve.
-    beside : sequence of Path
-        Further files of the same valve, if each signal has its own file.
-
-    Returns
-    -------
-    tuple of RecordedValve
-        The recordings on a uniform grid; their first note describes how the table was read.
-
-    Raises
-    ------
-    ValueError
-        If the file cannot be read, leaves a question open, or contains an impossible value or more
-        bad values than `form` allows. The message gives file, row, cause and remedy.
-    RefusalError
-        If there is only one sample, or gaps take more than half of the time.
-    """
-    table = OpenTables((path, *beside), form)
-    table.require_settled()
-    valves = table.layout.valves
-    if name is not None and len(valves) > 1:
-        chosen = {one: each for one, each in valves.items() if plain_name(one) == plain_name(name)}
-        if not chosen:
-            known = ", ".join(valves)
-            raise ValueError(f"{path}: no valve is called {name!r}: choose one of {known}")
-        valves = chosen
-    every = [signal for signals in valves.values() for signal in signals]
-    read = dict(zip(every, table.read(every, stretch), strict=True))
-    form = table.layout.form
-    found = []
-    for label, signals in valves.items():
-        try:
-            one = _recorded(table, label, [read[each] for each in signals], valve, form)
-        except (ValueError, RefusalError) as error:
-            if len(valves) == 1:
-                raise
-            reason = str(error).removeprefix(f"{path}: ")
-            one = RecordedValve(path, label, RefusalError(reason))
-        found.append(one)
-    return tuple(found)
-
-
 def _recorded(
-    table: OpenTables, label: str, reads: Sequence[ReadSignal], valve: Valve, form: Columns
-) -> RecordedValve:
-    """Build the recording of one valve from its drive, position and opposing pressure."""
-    path = table.path
+    table: OpenTables, reads: Sequence[ReadSignal], valve: Valve
+) -> tuple[Recording, tuple[str, ...]]:
+    """Build the recording of one valve, with notes, from drive, position and opposing pressure."""
+    form = table.layout.form
     for each in reads:
         require_good(each, form)
     drives = [each for each in reads if each.signal.quantity != "position"]
@@ -223,7 +144,7 @@ def _recorded(
         raise RefusalError(f"{table.name}: {refusal}") from None
     notes = [] if table.layout.is_own else [table.layout.words]
     notes += [told for each in reads if (told := left_out(each))]
-    return RecordedValve(path, label, recording, tuple(notes))
+    return recording, tuple(notes)
 
 
 @dataclass(frozen=True)
@@ -248,16 +169,47 @@ class ReadingOptions:
     beside: tuple[Path, ...] = ()
 
 
+def _read_table(path: Path, valve: Valve, options: ReadingOptions) -> tuple[RecordedValve, ...]:
+    """Read the recordings of all valves in a table; their first note tells how it was read.
+
+    The samples are resampled like those of topics, with stamps in whole nanoseconds, so that a
+    recording gives the same numbers from a file and from topics.
+    """
+    table = OpenTables((path, *options.beside), options.columns)
+    table.require_settled()
+    valves, name = table.layout.valves, options.topics.valve
+    if name is not None and len(valves) > 1:
+        chosen = {one: each for one, each in valves.items() if plain_name(one) == plain_name(name)}
+        if not chosen:
+            known = ", ".join(valves)
+            raise ValueError(f"{path}: no valve is called {name!r}: choose one of {known}")
+        valves = chosen
+    every = [signal for signals in valves.values() for signal in signals]
+    read = dict(zip(every, table.read(every, options.stretch), strict=True))
+    found = []
+    for label, signals in valves.items():
+        outcome: tuple[Recording | RefusalError, tuple[str, ...]]
+        try:
+            outcome = _recorded(table, [read[each] for each in signals], valve)
+        except (ValueError, RefusalError) as error:
+            if len(valves) == 1:
+                raise
+            outcome = RefusalError(str(error).removeprefix(f"{path}: ")), ()
+        found.append(RecordedValve(path, label, *outcome))
+    return tuple(found)
+
+
 def holds_force(path: Path, options: ReadingOptions) -> bool:
     """Return whether a file has the force of a machine without a diaphragm, and no pressure.
 
-    Raises
-    ------
-    ValueError
-        If a table cannot be read or has neither pressure nor force.
+    Raises ValueError if a table cannot be read or leaves a question open.
     """
-    is_table = not _is_bag(path, options)
-    return is_table and holds_a_force(path, options.columns, options.beside)
+    if _is_bag(path, options):
+        return False
+    table = OpenTables((path, *options.beside), options.columns)
+    table.require_settled()
+    signals = (signal for group in table.layout.valves.values() for signal in group)
+    return any(signal.quantity == "force" for signal in signals)
 
 
 def _is_bag(path: Path, options: ReadingOptions) -> bool:
@@ -307,5 +259,4 @@ def read_recordings(
         with bag_libraries():
             from valve_friction_ros.records.bags.reading import read_bag  # noqa: PLC0415
         return read_bag(path, valve, options.topics, options.stretch)
-    form, name = options.columns, options.topics.valve
-    return read_table(path, valve, form, options.stretch, name, options.beside)
+    return _read_table(path, valve, options)

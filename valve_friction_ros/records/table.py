@@ -108,51 +108,15 @@ class _Parts:
         return found
 
 
-class OpenTable:
-    """A table with a recognized layout; `require_settled` raises its open questions.
+class _Reader:
+    """Reads the signals of one file, block by block."""
 
-    Attributes
-    ----------
-    path : Path
-        The file.
-    layout : Layout
-        Layout of the table.
-    """
+    def __init__(self, layout: Layout) -> None:
+        self.layout = layout
+        self.path = layout.raw.path
 
-    def __init__(self, path: Path, form: Columns | None = None, is_part: bool = False) -> None:
-        self.path = path
-        raw = open_raw(path, form or Columns())
-        self.layout: Layout = recognized(raw, form or Columns(), is_part)
-
-    def require_settled(self) -> None:
-        """Raise ValueError, with all open questions in one line, if the table leaves any."""
-        layout = self.layout
-        if not layout.questions:
-            return
-        if layout.raw.is_text and not layout.times and len(layout.headers) < 2:
-            (only, *_) = (*layout.headers, "")
-            raise ValueError(
-                f"{self.path}: only one column, {quoted(only)}: name the delimiter of the file "
-                "(--delimiter)"
-            )
-        raise ValueError(f"{self.path}: cannot tell {'; '.join(layout.questions)}")
-
-    def read(
-        self,
-        signals: Sequence[TableSignal],
-        stretch: Stretch | None = None,
-    ) -> list[ReadSignal]:
-        """Read signals within a stretch; only these samples are kept in memory.
-
-        Raises
-        ------
-        ValueError
-            If the table cannot be read to its end, has too many rows, or has times that go back.
-            The message gives row and remedy.
-        RefusalError
-            If the stretch contains no rows.
-        """
-        stretch = stretch or Stretch()
+    def read(self, signals: Sequence[TableSignal], stretch: Stretch) -> list[ReadSignal]:
+        """Read signals as `OpenTables.read` does."""
         parts = [_Parts(signal) for signal in signals]
         start: int | None = None
         for stamps_of, block, row_numbers in self._blocks(signals):
@@ -169,8 +133,7 @@ class OpenTable:
             for part in parts:
                 self._keep(part, block, row_numbers, stamps_of, bounds)
             self._drop_old(parts, stretch)
-            most = max(sum(each.stamps.size for each in part.blocks) for part in parts)
-            self._require_room(most)
+            self._require_room(parts)
         if start is None and not any(part.bad for part in parts):
             raise ValueError(f"{self.path}: no rows below the header")
         found = [part.joined(stretch.last) for part in parts]
@@ -198,11 +161,7 @@ class OpenTable:
         for rows, block in blocks:
             if not len(block):
                 continue
-            yield (
-                {key: self._times(clocks[key], key, block) for key in keys},
-                block,
-                rows,
-            )
+            yield {key: self._times(clocks[key], key, block) for key in keys}, block, rows
 
     def _times(
         self, clock: WrittenTimes, key: tuple[int, ...], block: "pd.DataFrame"
@@ -299,9 +258,9 @@ class OpenTable:
         for part in parts:
             part.forget_before(min(newest) - (stretch.last + 1) * 1e9)
 
-    def _require_room(self, count: int) -> None:
+    def _require_room(self, parts: Sequence[_Parts]) -> None:
         most = self.layout.form.maximum_rows
-        if count > most:
+        if max(sum(each.stamps.size for each in part.blocks) for part in parts) > most:
             raise ValueError(
                 f"{self.path}: more than {most} rows: raise maximum_rows (--maximum-rows), or "
                 "choose a part by --begin and --end"
@@ -342,48 +301,64 @@ class OpenTable:
         return f"{self.path}: {place} {what} ({now} after {before}): {remedy}"
 
 
+def layout_of(path: Path, form: Columns, is_part: bool = False) -> Layout:
+    """Recognize the layout of a table with its open questions; raises ValueError if unreadable.
+
+    With `is_part` the file holds only a part of the signals of a valve.
+    """
+    return recognized(open_raw(path, form), form, is_part)
+
+
 class OpenTables:
     """The table of a recording, or several tables with the signals of one valve.
 
     Attributes
     ----------
-    path : Path
-        The first file.
+    name : str
+        All files, for messages.
     layout : Layout
         Common layout with the signals of all tables.
     """
 
-    def __init__(self, paths: Sequence[Path], form: Columns | None = None) -> None:
-        self.path = paths[0]
-        tables = [OpenTable(path, form, len(paths) > 1) for path in paths]
-        self._tables = dict(zip(paths, tables, strict=True))
-        layouts = [table.layout for table in tables]
+    def __init__(self, paths: Sequence[Path], form: Columns) -> None:
+        layouts = [layout_of(path, form, len(paths) > 1) for path in paths]
+        self._layouts = dict(zip(paths, layouts, strict=True))
+        self.name = ", ".join(map(str, self._layouts))
         self.layout = layouts[0] if len(layouts) == 1 else _joined(layouts)
-
-    @property
-    def name(self) -> str:
-        """All files, for messages."""
-        return ", ".join(map(str, self._tables))
 
     def require_settled(self) -> None:
         """Raise ValueError, with all open questions in one line, if the files leave any."""
-        if len(self._tables) == 1:
-            self._tables[self.path].require_settled()
-        elif self.layout.questions:
-            raise ValueError(f"{self.name}: cannot tell {'; '.join(self.layout.questions)}")
+        layout = self.layout
+        if not layout.questions:
+            return
+        is_lone = len(self._layouts) == 1 and len(layout.headers) < 2
+        if is_lone and layout.raw.is_text and not layout.times:
+            (only, *_) = (*layout.headers, "")
+            raise ValueError(
+                f"{self.name}: only one column, {quoted(only)}: name the delimiter of the file "
+                "(--delimiter)"
+            )
+        raise ValueError(f"{self.name}: cannot tell {'; '.join(layout.questions)}")
 
     def clock_of(self, signal: TableSignal) -> str:
         """Return the header of the times of a signal."""
-        return self._tables[signal.path].layout.headers[signal.time[0]]
+        return self._layouts[signal.path].headers[signal.time[0]]
 
-    def read(
-        self, signals: Sequence[TableSignal], stretch: Stretch | None = None
-    ) -> list[ReadSignal]:
-        """Read signals as `OpenTable.read` does; the stretch applies to each file separately."""
+    def read(self, signals: Sequence[TableSignal], stretch: Stretch) -> list[ReadSignal]:
+        """Read signals within a stretch of each file; only these samples are kept in memory.
+
+        Raises
+        ------
+        ValueError
+            If a table cannot be read to its end, has too many rows, or has times that go back. The
+            message gives row and remedy.
+        RefusalError
+            If the stretch contains no rows.
+        """
         found: dict[TableSignal, ReadSignal] = {}
-        for path, table in self._tables.items():
+        for path, layout in self._layouts.items():
             if own := [signal for signal in signals if signal.path == path]:
-                found.update(zip(own, table.read(own, stretch), strict=True))
+                found.update(zip(own, _Reader(layout).read(own, stretch), strict=True))
         return [found[signal] for signal in signals]
 
 

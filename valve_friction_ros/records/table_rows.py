@@ -189,14 +189,10 @@ class RawTable:
 
     Attributes
     ----------
-    path : Path
-        The file, as named in messages.
-    head : tuple of str
-        First lines of a text; empty for a file of cells.
-    cells : sequence of sequences of str
-        First rows of a file of cells.
-    encoding : str
-        Encoding of a text.
+    path, place : Path
+        The file, as named in messages and as it is opened.
+    head, cells : sequence
+        First lines of a text, or first rows of a file of cells; the other is empty.
     """
 
     path: Path

@@ -90,6 +90,14 @@ NANOSECONDS: Mapping[str, int] = {
 }
 """Units of time in nanoseconds, the unit of all stamps."""
 
+UNITS: Mapping[str, Mapping[str, Unit]] = {
+    "time": {name: Unit(size, 1e9) for name, size in NANOSECONDS.items()},
+    "position": POSITION_UNITS,
+    "pressure": PRESSURE_UNITS,
+    "force": FORCE_UNITS,
+}
+"""Units of signals by quantity."""
+
 _NAMES = {
     PERCENT: "%, pct, prozent, % open, %open, percent open, % travel, % of travel, % of span",
     "fraction": "0-1, 0..1, p.u., pu, ratio",
@@ -132,15 +140,16 @@ AREA: Mapping[str, Unit] = {
     "mm2": Unit(1, 1e6),
     "in2": Unit(6.4516, 1e4),
 }
-LENGTH, PRESSURE = POSITION_UNITS, PRESSURE_UNITS
 MASS: Mapping[str, Unit] = {"kg": Unit(1), "g": Unit(1, 1e3), "lb": Unit(0.45359237)}
 
-_KNOWN = (*NANOSECONDS, *POSITION_UNITS, *PRESSURE_UNITS, *FORCE_UNITS, *SHARES)
-_BY_CASE = {name.casefold(): name for name in _KNOWN} | {
+KNOWN = {*SHARES}.union(*UNITS.values())
+"""Names of all units of signals."""
+
+_BY_CASE = {name.casefold(): name for name in KNOWN} | {
     name.casefold(): known for name, known in _OTHER_NAMES.items()
 }
 
-_EXAMPLES = ((AREA, "690 cm2"), (LENGTH, "28.6 mm"), (MASS, "1.6 kg"))
+_EXAMPLES = ((AREA, "690 cm2"), (POSITION_UNITS, "28.6 mm"), (MASS, "1.6 kg"))
 
 _NUMBER = r"([+-]?\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?)"
 _SINGLE = re.compile(rf"\s*{_NUMBER}\s*(\D.*?)?\s*", re.ASCII)

@@ -14,7 +14,14 @@ from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from typing import Any, NamedTuple
 
-from valve_friction_ros.records.units import AREA, LENGTH, MASS, PRESSURE, quantity, span
+from valve_friction_ros.records.units import (
+    AREA,
+    MASS,
+    POSITION_UNITS,
+    PRESSURE_UNITS,
+    quantity,
+    span,
+)
 
 _ATMOSPHERE = 101_325.0
 
@@ -41,8 +48,8 @@ def _choice(name: str, words: str, *choices: str) -> ActuatorQuestion:
     return ActuatorQuestion(name, words, ", ".join(choices), chosen, choices[0])
 
 
-_area, _length = partial(quantity, units=AREA), partial(quantity, units=LENGTH)
-_mass, _pressures = partial(quantity, units=MASS), partial(span, units=PRESSURE)
+_area, _length = partial(quantity, units=AREA), partial(quantity, units=POSITION_UNITS)
+_mass, _pressures = partial(quantity, units=MASS), partial(span, units=PRESSURE_UNITS)
 
 QUESTIONS = (
     ActuatorQuestion("tag", "tag of the valve", "FV-101", str),

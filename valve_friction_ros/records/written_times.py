@@ -100,13 +100,9 @@ class TimeForm:
     formats : tuple of str
         Formats of dates (strptime), the most frequent first; empty for numbers and durations.
     zone : str
-        Zone of dates without a zone, and of numbers in days.
-    unit : str
-        Unit of numbers.
-    origin : int
-        Origin of numbers, ns since 1970.
-    has_zone : bool
-        Whether the dates include their zone.
+        Zone of dates, unless each has its own (`has_zone`), and of numbers in days.
+    unit, origin : str, int
+        Unit of numbers, and their origin, ns since 1970.
     """
 
     formats: tuple[str, ...] = ()

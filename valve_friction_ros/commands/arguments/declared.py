@@ -38,7 +38,7 @@ from valve_friction_ros.history import URL_VARIABLE
 from valve_friction_ros.identification import LEAST_FIT
 from valve_friction_ros.outside_text import nearest
 from valve_friction_ros.records.files import history_file
-from valve_friction_ros.records.units import LENGTH, PRESSURE, unit_named
+from valve_friction_ros.records.units import POSITION_UNITS, PRESSURE_UNITS, unit_named
 from valve_friction_ros.records.valve_description import QUESTIONS
 
 
@@ -198,8 +198,8 @@ def _plan_test(parser: argparse.ArgumentParser) -> None:
         --json: print one JSON object
         """,
         output={"default": Path("stroke_test.csv")},
-        pressure_unit={"type": unit_named, "choices": [*PRESSURE], "default": "kPa"},
-        position_unit={"type": unit_named, "choices": [*LENGTH], "default": "mm"},
+        pressure_unit={"type": unit_named, "choices": [*PRESSURE_UNITS], "default": "kPa"},
+        position_unit={"type": unit_named, "choices": [*POSITION_UNITS], "default": "mm"},
     )
 
 

@@ -28,7 +28,7 @@ from valve_friction_ros.identification import (
     UNITS,
     IdentificationSettings,
 )
-from valve_friction_ros.planning import AIMS, Conditions, Limits
+from valve_friction_ros.planning.conditions import AIMS, STOP_MARGIN, Conditions, Limits
 from valve_friction_ros.settings import identification_from
 
 if TYPE_CHECKING:
@@ -42,8 +42,8 @@ _percent = partial(percent, least=0.0, words=" of the travel, such as 40")
 def add_planning_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments on known data, limits, sensors and aim."""
     _add_known(parser)
-    _add_limits(parser)
-    _add_sensors(parser)
+    _add_limits(parser.add_argument_group("limits", "what the test may do"))
+    _add_sensors(parser.add_argument_group("sensors"))
     parser.add_argument(
         "--for",
         dest="aim",
@@ -84,51 +84,51 @@ def _add_known(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _add_limits(parser: argparse.ArgumentParser) -> None:
-    limits, default = parser.add_argument_group("limits", "what the test may do"), Limits()
+def _add_numbers(group: argparse._ArgumentGroup, *numbers: tuple[str, str, float, str]) -> None:
+    """Declare options for numbers: name, unit, default, which is shown if finite, and help."""
+    for name, unit, default, text in numbers:
+        shown = f" ({default:g})" if math.isfinite(default) else ""
+        group.add_argument(
+            f"--{name}", type=float, default=default, metavar=unit, help=f"{text}{shown}"
+        )
+
+
+def _add_limits(group: argparse._ArgumentGroup) -> None:
+    default = Limits()
     lowest = {"dest": "lowest", "type": _percent, "default": default.lowest}
     add_options(
-        limits,
+        group,
         f"""
         --from PERCENT: lowest position, in percent of travel ({100 * default.lowest:g})
         --to PERCENT: highest position ({100 * default.highest:g})
         --allow-stops: let the stem reach seat and stop; otherwise even a stem without friction
-            stays {100 * default.stop_margin:g} %% of travel away from them
+            stays {100 * STOP_MARGIN:g} %% of travel away from them
         """,
         **{"from": lowest},
         to={"dest": "highest", "type": _percent, "default": default.highest},
     )
-    for name, unit, text in (
-        ("speed", "M/S", "largest speed of the sliding stem, m/s"),
-        ("duration", "S", "longest duration, s"),
-        ("pressure_rate", "PA/S", "largest rate of the pressure, Pa/s"),
-        ("pressure_minimum", "PA", "lowest pressure, Pa; the limit in the valve file applies too"),
-        ("pressure_maximum", "PA", "highest pressure, Pa; the limit in the valve file applies too"),
-    ):
-        value = getattr(default, name)
-        shown = f" ({value:g})" if math.isfinite(value) else ""
-        limits.add_argument(
-            f"--{name.replace('_', '-')}",
-            type=float,
-            default=value,
-            metavar=unit,
-            help=f"{text}{shown}",
-        )
+    too = "Pa; the limit in the valve file applies too"
+    _add_numbers(
+        group,
+        ("speed", "M/S", default.speed, "largest speed of the sliding stem, m/s"),
+        ("duration", "S", default.duration, "longest duration, s"),
+        ("pressure-rate", "PA/S", default.pressure_rate, "largest rate of the pressure, Pa/s"),
+        ("pressure-minimum", "PA", default.pressure_minimum, f"lowest pressure, {too}"),
+        ("pressure-maximum", "PA", default.pressure_maximum, f"highest pressure, {too}"),
+    )
 
 
-def _add_sensors(parser: argparse.ArgumentParser) -> None:
-    sensors, usual = parser.add_argument_group("sensors"), Conditions()
-    for name, unit, value, text in (
+def _add_sensors(group: argparse._ArgumentGroup) -> None:
+    usual = Conditions()
+    _add_numbers(
+        group,
         ("sample-rate", "HZ", usual.sample_rate, "samples per second of both signals"),
         ("position-noise-um", "UM", 1e6 * usual.position_noise, "noise of the stem sensor, µm"),
         ("pressure-noise-pa", "PA", usual.pressure_noise, "noise of the pressure sensor, Pa"),
         ("converter-lag", "S", usual.converter_lag, "time constant of the pressure converter, s"),
-    ):
-        sensors.add_argument(
-            f"--{name}", type=float, default=value, metavar=unit, help=f"{text} (%(default)g)"
-        )
+    )
     add_options(
-        sensors,
+        group,
         "--timing-uncertainty S: standard deviation of the total lag between the signals, as in "
         f"`identify` (valve file, or {TIMING_UNCERTAINTY:g})",
         timing_uncertainty={"type": float},

@@ -20,7 +20,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from valve_friction_ros.commands.arguments import add_options
-from valve_friction_ros.records.bags.topics import TopicChoice
+from valve_friction_ros.records.bags.topics import VALVE_FILE, TopicChoice
 from valve_friction_ros.records.columns import Columns
 
 if TYPE_CHECKING:
@@ -28,9 +28,6 @@ if TYPE_CHECKING:
     from valve_friction_ros.records.recorded_valve import RecordedValve
     from valve_friction_ros.records.recordings import ReadingOptions
     from valve_friction_ros.records.valve_file import ValveFile
-
-_OWN_DESCRIPTION = "valve.yaml"
-"""Name of the valve file that ``~/save`` writes into a bag."""
 
 
 def add_recording_arguments(parser: argparse.ArgumentParser) -> None:
@@ -173,9 +170,9 @@ def reading_progress() -> "Iterator[None]":
         return
     from rich.progress import Progress  # noqa: PLC0415 - slow to import
 
-    from valve_friction_ros.commands.console import OutputConsole  # noqa: PLC0415
+    from valve_friction_ros.commands.console import shown_progress  # noqa: PLC0415
 
-    with Progress(console=OutputConsole(stderr=True), transient=True) as progress:
+    with shown_progress(*Progress.get_default_columns()) as progress:
         task = progress.add_task("reading", total=1.0)
         token = PROGRESS.set(lambda share: progress.update(task, completed=share))
         try:
@@ -186,7 +183,7 @@ def reading_progress() -> "Iterator[None]":
 
 def _own_description(recording: Path) -> Path | None:
     folder = recording if recording.is_dir() else recording.parent
-    place = folder / _OWN_DESCRIPTION
+    place = folder / VALVE_FILE
     is_own = recording.is_dir() or (folder / "metadata.yaml").exists()
     return place if is_own and place.is_file() else None
 

@@ -9,4 +9,4 @@
 
 """Sub-command `demo`: a simulated valve whose friction grows."""
 
-from valve_friction_ros.commands.demo.command import REFUSALS as REFUSALS, run as run
+from valve_friction_ros.commands.demo.command import run as run

@@ -14,70 +14,60 @@ import os
 import socket
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from sensor_msgs.msg import FluidPressure, JointState
 
+from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.model import Recording
 from valve_friction_ros.nodes.plumbing.messages import position_of, stamp_of
 from valve_friction_ros.nodes.plumbing.polled_subscription import PolledSubscription
 from valve_friction_ros.nodes.plumbing.qos import stream
 from valve_friction_ros.nodes.plumbing.rclpy_private import PROFILES
-from valve_friction_ros.nodes.service_call import (
-    TriggerCall,
-    UnansweredError,
-    set_parameters_request,
-)
+from valve_friction_ros.nodes.service_call import Caller
 from valve_friction_ros.streams import RecordBuffer
 from valve_friction_ros.wording import Code, said
 
-_POLL = 0.05
+_ANSWER_TIMEOUT = 120.0
 
 
-class BenchError(Exception):
-    """The bench failed; the message gives the cause."""
-
-
-class BenchClient(Node):
+class BenchClient(Caller):
     """Collects in `buffer` the samples of the bench in `namespace`, as any other node could."""
 
-    def __init__(self, namespace: str, buffer: RecordBuffer) -> None:
-        super().__init__("demo", namespace=namespace)
-        self._executor = SingleThreadedExecutor()
-        self._executor.add_node(self)
+    def __init__(self, node: Node, namespace: str, buffer: RecordBuffer) -> None:
+        super().__init__(node, lambda: True)
         self._buffer = buffer
         self._identifier = f"/{namespace}/identifier"
-        self._status: DiagnosticStatus | None = None
         self._first_stamp: int | None = None
         self._last_stamp = 0
+        self.status: DiagnosticStatus | None = None
         # Taken in blocks, as in the nodes: a callback per sample would take most of a core.
-        self._pressures = PolledSubscription(self, FluidPressure, "actuator_pressure", stream())
-        self._stems = PolledSubscription(self, JointState, "stem_state", stream())
-        self.create_subscription(DiagnosticArray, "/diagnostics", self._on_diagnostics, 10)
+        self._pressures = PolledSubscription(node, FluidPressure, "actuator_pressure", stream())
+        self._stems = PolledSubscription(node, JointState, "stem_state", stream())
+        node.create_subscription(DiagnosticArray, "/diagnostics", self._on_diagnostics, 10)
 
     def _take(self) -> None:
-        for taken in self._pressures.take():
-            message = taken.message
-            self._buffer.add_pressure(stamp_of(message.header.stamp), message.fluid_pressure)
-        for taken in self._stems.take():
-            self._on_stem(taken.message)
-
-    def _on_stem(self, message: JointState) -> None:
-        stamp = stamp_of(message.header.stamp)
-        self._buffer.add_position(stamp, position_of(message, ""))
-        self._first_stamp = stamp if self._first_stamp is None else self._first_stamp
-        self._last_stamp = stamp
+        """Take all samples that have arrived."""
+        has_more = True
+        while has_more:
+            for taken in self._pressures.take():
+                message = taken.message
+                self._buffer.add_pressure(stamp_of(message.header.stamp), message.fluid_pressure)
+            for taken in self._stems.take():
+                self._last_stamp = stamp_of(taken.message.header.stamp)
+                self._buffer.add_position(self._last_stamp, position_of(taken.message, ""))
+                if self._first_stamp is None:
+                    self._first_stamp = self._last_stamp
+            has_more = self._pressures.has_more or self._stems.has_more
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:
             if status.name == f"{self._identifier}: friction":
-                self._status = status
+                self.status = status
 
     @property
     def recorded(self) -> float:
@@ -85,30 +75,13 @@ class BenchClient(Node):
         return 0.0 if self._first_stamp is None else (self._last_stamp - self._first_stamp) / 1e9
 
     @property
-    def level(self) -> int | None:
-        """Level of the latest diagnostic."""
-        return None if self._status is None else self._status.level[0]
-
-    @property
-    def diagnostic_message(self) -> str:
-        """Text of the latest diagnostic."""
-        return "" if self._status is None else self._status.message
-
-    @property
     def diagnostic_values(self) -> dict[str, str]:
         """Key-value pairs of the latest diagnostic."""
-        return {} if self._status is None else {v.key: v.value for v in self._status.values}
-
-    @property
-    def identifier_hears(self) -> bool:
-        """Whether the latest diagnostic shows samples of both signals."""
-        shown = self.diagnostic_values
-        return all(
-            int(shown.get(f"buffered_{signal}", "0")) > 0 for signal in ("pressures", "positions")
-        )
+        return {} if self.status is None else {v.key: v.value for v in self.status.values}
 
     def begin_record(self) -> None:
         """Discard all samples and start a new record."""
+        self._take()
         self._buffer.clear(said(Code.CLEARED_AS_RECORD_BEGINS))
         self._first_stamp = None
 
@@ -117,42 +90,21 @@ class BenchClient(Node):
         return self._buffer.snapshot().recording()
 
     def wait(self, done: Callable[[], bool], timeout: float, what: str) -> None:
-        """Spin until `done` is true; raises BenchError, which names `what`, after `timeout` s."""
-        deadline = time.monotonic() + timeout
-        while not done():
-            if time.monotonic() > deadline:
-                raise BenchError(f"no {what} within {timeout:g} s")
-            self._executor.spin_once(timeout_sec=_POLL)
+        """Spin until `done` is true; raises RefusalError, which names `what`, after `timeout` s."""
+
+        def is_done() -> bool:
             self._take()
+            return done()
 
-    def trigger(self, service: str, timeout: float = 120.0) -> str:
-        """Call a Trigger service of the identifier and return its message."""
-        call = TriggerCall(self, self._identifier, service, timeout, timeout)
-        try:
-            self.wait(call.step, 2 * timeout, f"answer of {service}")
-        except UnansweredError as error:
-            raise BenchError(str(error)) from None
-        finally:
-            call.close()
-        if not call.answer.success:
-            raise BenchError(f"{service}: {call.answer.message}")
-        return str(call.answer.message)
+        if not self._wait(is_done, timeout):
+            raise RefusalError(f"no {what} within {timeout:g} s")
 
-    def set_parameters(self, node: str, values: Mapping[str, float], timeout: float = 10.0) -> None:
-        """Set parameters of a node of the bench atomically."""
-        target = f"{self.get_namespace()}/{node}"
-        asked = set_parameters_request(self, target, values)
-        try:
-            self.wait(asked.step, timeout, f"answer of {target}/set_parameters_atomically")
-        finally:
-            asked.close()
-        if not asked.answer.result.successful:
-            raise BenchError(f"{node} refused: {asked.answer.result.reason}")
-
-    def close(self) -> None:
-        """Shut down the executor and destroy the node."""
-        self._executor.shutdown()
-        self.destroy_node()
+    def trigger(self, service: str) -> str:
+        """Call a service of the identifier and return its message; raises RefusalError."""
+        answer = self.call(self._identifier, service, _ANSWER_TIMEOUT)
+        if answer is None or not answer.success:
+            raise RefusalError(f"{service}: {answer.message if answer else 'no answer'}")
+        return answer.message
 
 
 _STOP_TIMEOUT = 5.0
@@ -192,18 +144,13 @@ def free_domain() -> Iterator[int]:
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as claim:
         for step in range(_DOMAINS):
             number = 1 + (first + step) % _DOMAINS
-            if str(number) != set_already and _is_bound(claim, number):
-                yield number
-                return
-    raise BenchError("no free ROS domain: stop another demo")
-
-
-def _is_bound(claim: socket.socket, number: int) -> bool:
-    try:
-        claim.bind(f"\0valve_friction_ros/domain/{number}")
-    except OSError:  # in use
-        return False
-    return True
+            if str(number) != set_already:
+                with contextlib.suppress(OSError):  # in use
+                    claim.bind(f"\0valve_friction_ros/domain/{number}")
+                    break
+        else:
+            raise RefusalError("no free ROS domain: stop another demo")
+        yield number
 
 
 def _command(node: NodeProcess, namespace: str) -> list[str]:
@@ -214,20 +161,14 @@ def _command(node: NodeProcess, namespace: str) -> list[str]:
     return command
 
 
-def _wait_or_kill(process: subprocess.Popen[bytes]) -> None:
-    try:
-        process.wait(_STOP_TIMEOUT)
-    except subprocess.TimeoutExpired:
-        process.kill()
-        process.wait()
-
-
 def _stop(processes: Sequence[subprocess.Popen[bytes]]) -> None:
     for process in processes:
-        if process.poll() is None:
-            process.terminate()
+        process.terminate()  # nothing happens to one that has ended
     for process in processes:
-        _wait_or_kill(process)
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            process.wait(_STOP_TIMEOUT)
+        process.kill()
+        process.wait()
 
 
 @contextlib.contextmanager

@@ -15,7 +15,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import rclpy
 from rclpy.signals import SignalHandlerOptions
@@ -26,7 +26,6 @@ from rich.table import Table
 from valve_friction_ros.commands.console import OutputConsole
 from valve_friction_ros.commands.demo.bench import (
     BenchClient,
-    BenchError,
     NodeProcess,
     free_domain,
     quick_discovery,
@@ -119,15 +118,11 @@ def identified(client: BenchClient, label: str, truth: KarnoppParameters) -> Out
     )
     values = client.diagnostic_values
     if "threshold [m/s]" not in values:
-        raise BenchError(f"no published estimate: {values['warnings']}")
+        raise RefusalError(f"no published estimate: {values['warnings']}")
     published = {name: float(values[f"{name} published [{UNITS[name]}]"]) for name in TOLERANCES}
     found = {name: _found(name, values) for name in TOLERANCES}
-    try:
-        drawn = identify(
-            recording, BENCH_VALVE, IdentificationSettings(fixed={"mass": WEIGHED_MASS})
-        )
-    except RefusalError as refusal:
-        raise BenchError(f"no picture: {refusal}") from None
+    settings = IdentificationSettings(fixed={"mass": WEIGHED_MASS})
+    drawn = identify(recording, BENCH_VALVE, settings)
     return Outcome(label, truth, published, found, Case.of(label, drawn))
 
 
@@ -168,8 +163,6 @@ def table_of(outcome: Outcome) -> Table:
         )
     return table
 
-
-REFUSALS = (BenchError, RefusalError)
 
 _NAMESPACE = "fv_101"
 _RECORD = 2 * SquareWave().period
@@ -219,48 +212,49 @@ def _nodes() -> list[NodeProcess]:
     ]
 
 
-class _Story(NamedTuple):
-    """Results of the demo: both states of the packing, and the final diagnostic."""
+def _is_heard(client: BenchClient) -> bool:
+    """Return whether the latest diagnostic of the identifier shows samples of both signals."""
+    shown = client.diagnostic_values
+    names = ("buffered_pressures", "buffered_positions")
+    return all(int(shown.get(name, "0")) > 0 for name in names)
 
-    outcomes: Sequence[Outcome]
-    level: int | None
-    message: str
 
-
-def _run(client: BenchClient, console: Console) -> _Story:
+def _run(client: BenchClient, console: Console) -> tuple[Outcome, Outcome]:
+    """Identify both states of the packing."""
     with console.status("waiting for the nodes"):
         client.wait(lambda: client.recorded > 0, _START_TIMEOUT, "stem position")
-        client.wait(lambda: client.identifier_hears, _START_TIMEOUT, "samples in the identifier")
+        client.wait(lambda: _is_heard(client), _START_TIMEOUT, "samples in the identifier")
     _record(client, console, "packing loose")
     before = identified(client, "packing loose", LOW_FRICTION)
     console.print(f"identified; {client.trigger('set_baseline')}", highlight=False)
     tightened = {name: getattr(HIGH_FRICTION, name) for name in _FRICTION}
-    client.set_parameters("simulator", tightened)
+    client.set_parameters(f"/{_NAMESPACE}/simulator", tightened, _START_TIMEOUT)
     console.print("the packing is tightened while the valve runs", highlight=False)
     client.begin_record()
     client.wait(lambda: client.recorded >= _UNDER_WAY, _START_TIMEOUT, "stem position")
     _record(client, console, "packing tight")
-    after = identified(client, "packing tight", HIGH_FRICTION)
-    return _Story((before, after), client.level, client.diagnostic_message)
+    return before, identified(client, "packing tight", HIGH_FRICTION)
 
 
-def _report(story: _Story, output: Path, console: Console) -> int:
-    """Print and plot the results, compare them with the tolerances; return the exit code."""
-    for outcome in story.outcomes:
+def _report(
+    outcomes: Sequence[Outcome], level: int, message: str, output: Path, console: Console
+) -> int:
+    """Print and plot the results, compare them with the tolerances; return the exit code.
+
+    `level` and `message` are those of the last diagnostic.
+    """
+    for outcome in outcomes:
         console.print(table_of(outcome))
-    level = "without a level" if story.level is None else Level(story.level).name
-    diagnosis = f"/diagnostics {level}: {story.message}"
+    diagnosis = f"/diagnostics {Level(level).name}: {message}"
     console.print(diagnosis, style="bold", highlight=False, markup=False)
-    missed = [
-        f"{name} ({outcome.label})" for outcome in story.outcomes for name in outcome.missed()
-    ]
+    missed = [f"{name} ({outcome.label})" for outcome in outcomes for name in outcome.missed()]
     if missed:
         console.print(f"outside the tolerance: {', '.join(missed)}", style="bold red")
-    if story.level != Level.ERROR:
+    if level != Level.ERROR:
         console.print("the excess friction was not diagnosed", style="bold red")
-    save_picture(friction_figure([outcome.case for outcome in story.outcomes], diagnosis), output)
+    save_picture(friction_figure([outcome.case for outcome in outcomes], diagnosis), output)
     console.print(f"picture: {output}", highlight=False, markup=False, soft_wrap=True)
-    return ExitCode.PARTLY if missed or story.level != Level.ERROR else ExitCode.DONE
+    return ExitCode.PARTLY if missed or level != Level.ERROR else ExitCode.DONE
 
 
 def run(options: argparse.Namespace) -> int:
@@ -285,10 +279,13 @@ def _demonstrated(options: argparse.Namespace, console: Console) -> int:
     with running_nodes(_nodes(), _NAMESPACE):
         # Python handles Ctrl-C: the handler of rclpy would end the context under the client.
         rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
-        client = BenchClient(_NAMESPACE, RecordBuffer(BENCH_VALVE, 2 * _RECORD))
+        node = rclpy.create_node("demo", namespace=_NAMESPACE)
+        client = BenchClient(node, _NAMESPACE, RecordBuffer(BENCH_VALVE, 2 * _RECORD))
         try:
-            story = _run(client, console)
+            outcomes = _run(client, console)
         finally:
             client.close()
+            node.destroy_node()
             rclpy.try_shutdown()
-    return _report(story, options.output, console)
+    status: Any = client.status  # an estimate was read from it
+    return _report(outcomes, status.level[0], status.message, options.output, console)

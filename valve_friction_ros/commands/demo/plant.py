@@ -20,8 +20,9 @@ from typing import NamedTuple
 
 from rich.console import Console
 
-from valve_friction_ros.commands.demo.bench import BenchError, NodeProcess, running_nodes
+from valve_friction_ros.commands.demo.bench import NodeProcess, running_nodes
 from valve_friction_ros.commands.process import ExitCode
+from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.model import BENCH_VALVE, SquareWave
 from valve_friction_ros.nodes.service_call import Caller, caller
 
@@ -36,16 +37,9 @@ _ANSWER_TIMEOUT = 120.0
 
 
 class PlantValve(NamedTuple):
-    """A valve of the plant, and the change of its packing.
+    """A valve in the namespace `name`, and the change of its packing, its `fate` in a word.
 
-    Attributes
-    ----------
-    name : str
-        Namespace of the valve.
-    fate : str
-        The change, in a word.
-    growth, end : float
-        Factor of friction from one identification to the next, and after all of them.
+    `growth` is the factor of friction from one identification to the next, `end` that after all.
     """
 
     name: str
@@ -67,11 +61,11 @@ VALVES = (
 
 
 def require_dashboard() -> None:
-    """Raise BenchError if NiceGUI is not installed."""
+    """Raise RefusalError if NiceGUI is not installed."""
     if importlib.util.find_spec("nicegui") is None:
         from valve_friction_ros.dashboard.context import INSTALL  # noqa: PLC0415 - rarely needed
 
-        raise BenchError(
+        raise RefusalError(
             f"the dashboard needs NiceGUI: run `{INSTALL}`, or `make demo DEMO_ARGS=--dashboard`"
         )
 
@@ -162,7 +156,7 @@ def _wait_for_page(process: subprocess.Popen[bytes], port: int) -> None:
             if tried.connect_ex(("127.0.0.1", port)) == 0:
                 return
         time.sleep(0.1)
-    raise BenchError(f"the dashboard did not open port {port} within {_START_TIMEOUT:g} s")
+    raise RefusalError(f"the dashboard did not open port {port} within {_START_TIMEOUT:g} s")
 
 
 def show_plant(console: Console, home: Path) -> int:

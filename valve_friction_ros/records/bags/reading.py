@@ -43,7 +43,6 @@ from valve_friction_ros.records.bags.topics import (
     STEM_TYPE,
     ZSTD,
     DamagedFileError,
-    Storage,
     Topic,
     TopicChoice,
     ValveTopics,
@@ -288,7 +287,7 @@ def _is_mcap(path: Path, start: bytes) -> bool:
 
 
 @contextlib.contextmanager
-def opened(path: Path, salvage: bool) -> Iterator[Storage]:
+def opened(path: Path, salvage: bool) -> Iterator[McapFile | SqliteFile | SalvagedMcap]:
     """Open a storage file, compressed or not; its first bytes determine its format.
 
     With `salvage` it is read without its index as far as possible. Raises ValueError if it is not a
@@ -310,7 +309,7 @@ _ALL = 1e9
 
 
 class ValveFeed:
-    """Fills a `RecordBuffer` from recorded messages of a valve with both topics.
+    """Fills a `RecordBuffer` from the recorded messages of a valve.
 
     Without a `joint`, the stem is the only joint, or the joint called `stem`.
     """
@@ -318,6 +317,7 @@ class ValveFeed:
     def __init__(
         self, topics: ValveTopics, valve: Valve, joint: str | None, stretch: Stretch
     ) -> None:
+        self.name = topics.name
         self._topics = topics
         self._joint = joint
         self._joints_seen: set[str] = set()
@@ -381,11 +381,19 @@ class ValveFeed:
             notes.append(f"{cause}: data recorded before that was left out")
         return notes
 
-    def recording(self) -> Recording:
-        """Resample both signals on a common grid, as the node does.
+    def outcome(self) -> Recording | RefusalError:
+        """Resample both signals on a common grid, as the node does; or return why not.
 
-        Raises RefusalError if the samples do not form a record, with remedies that suit a file.
+        The remedies of a refusal suit a file.
         """
+        try:
+            return self._recording()
+        except RefusalError as refusal:
+            return refusal
+
+    def _recording(self) -> Recording:
+        if self._topics.missing is not None:
+            raise RefusalError(self._topics.missing)
         if self._refusal is not None:
             raise RefusalError(self._refusal)
         snapshot = self._buffer.snapshot()
@@ -421,15 +429,6 @@ def _valves(
         raise ValueError(f"{path}: {error}") from None
 
 
-def _outcome(feed: ValveFeed, topics: ValveTopics) -> Recording | RefusalError:
-    if topics.missing is not None:
-        return RefusalError(topics.missing)
-    try:
-        return feed.recording()
-    except RefusalError as refusal:
-        return refusal
-
-
 def _read(
     path: Path,
     files: Sequence[Path],
@@ -437,16 +436,16 @@ def _read(
     valve: Valve,
     choice: TopicChoice,
     stretch: Stretch,
-) -> list[tuple[ValveTopics, ValveFeed]]:
+) -> list[ValveFeed]:
     """Read all valves from a bag; from damaged files only the part that can be salvaged."""
     with contextlib.ExitStack() as stack:
         storages = [stack.enter_context(opened(file, file in damaged)) for file in files]
         topics = {topic for storage in storages for topic in storage.topics}
         found = [
-            (each, ValveFeed(each, valve, choice.joint, stretch))
+            ValveFeed(each, valve, choice.joint, stretch)
             for each in _valves(path, topics, choice, damaged)
         ]
-        takers = {topic: take for _, feed in found for topic, take in feed.inputs.items()}
+        takers = {topic: take for feed in found for topic, take in feed.inputs.items()}
         for storage in storages:
             for topic, data in storage.messages(takers.keys() & set(storage.topics)):
                 takers[topic](data)
@@ -454,10 +453,7 @@ def _read(
 
 
 def read_bag(
-    path: Path,
-    valve: Valve,
-    choice: TopicChoice | None = None,
-    stretch: Stretch | None = None,
+    path: Path, valve: Valve, choice: TopicChoice, stretch: Stretch
 ) -> tuple[RecordedValve, ...]:
     """Read the recordings of all valves in a bag, by namespace, in one pass over its messages.
 
@@ -468,7 +464,6 @@ def read_bag(
     metadata or index are missing, or the file is truncated, it is read as far as possible. Raises
     ValueError, one line with the remedy, if the file is not a bag of ROS 2 or contains no valve.
     """
-    choice, stretch = choice or TopicChoice(), stretch or Stretch()
     files, notes = storage_files(path)
     damaged: dict[Path, str] = {}
     while True:
@@ -484,6 +479,5 @@ def read_bag(
         for file, cause in damaged.items()
     ]
     return tuple(
-        RecordedValve(path, topics.name, _outcome(feed, topics), (*notes, *feed.notes()))
-        for topics, feed in found
+        RecordedValve(path, feed.name, feed.outcome(), (*notes, *feed.notes())) for feed in found
     )

@@ -9,7 +9,7 @@
 
 """Messages of a bag, and all uses of private names of rosbags.
 
-Checked with rosbags 0.11.9; `test_bags_of_valves.py` reports what a newer version lacks.
+Checked with rosbags 0.11.9; used are:
 
 - `McapReader`: the documented `Reader` infers the format of a file from its ending. It also refuses
   an MCAP file without index whose receive times go back, as those of several topics may.
@@ -48,14 +48,6 @@ _DAMAGE = (
     ValueError,
 )
 """Exceptions that `McapReader` raises for a damaged file."""
-
-
-def decoded(body: bytes, kind: str, little_endian: bool) -> Any:
-    """Decode the body of a CDR message, ignoring bytes after its end."""
-    definition = TYPES.get_msgdef(kind)
-    read = definition.deserialize_cdr_le if little_endian else definition.deserialize_cdr_be
-    message, _ = read(body, 0, definition.cls, TYPES)
-    return message
 
 
 class McapFile:
@@ -98,15 +90,12 @@ class McapFile:
         self._reader.close()
 
 
-_NANOSECONDS = 1_000_000_000
-
-
 class UndecodableError(ValueError):
     """Bytes that are not a message of the type of their topic."""
 
 
 def decode(data: bytes, kind: str) -> Any:
-    """Decode a message, compressed by its recorder or not.
+    """Decode a message, compressed by its recorder or not, ignoring bytes after its end.
 
     Raises UndecodableError if the bytes are not such a message.
     """
@@ -117,25 +106,16 @@ def decode(data: bytes, kind: str) -> Any:
             raise UndecodableError(str(error)) from None
     if len(data) < 4 or data[0] != 0 or data[1] > 1:
         raise UndecodableError("not in CDR")
+    definition = TYPES.get_msgdef(kind)
+    read = definition.deserialize_cdr_le if data[1] else definition.deserialize_cdr_be
     try:
-        return decoded(data[4:], kind, bool(data[1]))
+        message, _ = read(data[4:], 0, definition.cls, TYPES)
     except (SerdeError, struct.error, ValueError, IndexError) as error:
         raise UndecodableError(str(error)) from None
-
-
-def encode(message: object, kind: str) -> bytes:
-    """Encode a message."""
-    return bytes(TYPES.serialize_cdr(message, kind))
+    return message
 
 
 def stamp_of(message: Any) -> int:
     """Return the header stamp of a message, ns."""
     stamp = message.header.stamp
-    return int(stamp.sec) * _NANOSECONDS + int(stamp.nanosec)
-
-
-def header(stamp: int) -> Any:
-    """Return a header with a stamp, ns."""
-    seconds, nanoseconds = divmod(stamp, _NANOSECONDS)
-    time = TYPES.types["builtin_interfaces/msg/Time"](sec=seconds, nanosec=nanoseconds)
-    return TYPES.types["std_msgs/msg/Header"](stamp=time, frame_id="")
+    return int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)

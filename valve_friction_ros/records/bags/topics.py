@@ -7,20 +7,23 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Recognition of bags, the interface of their files, and the topics of each valve."""
+"""Recognition of bags, and the topics of each valve."""
 
 import contextlib
 from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
 from itertools import takewhile
 from pathlib import Path
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 PRESSURE_TYPE = "sensor_msgs/msg/FluidPressure"
 STEM_TYPE = "sensor_msgs/msg/JointState"
 
 _OWN_NAMES = {PRESSURE_TYPE: "actuator_pressure", STEM_TYPE: "stem_state"}
 """Names of the topics of this package."""
+
+VALVE_FILE = "valve.yaml"
+"""File name of a valve description in the folder of a bag."""
 
 _MOST_LISTED = 12
 """Largest number of topics in a message."""
@@ -228,12 +231,3 @@ class DamagedFileError(Exception):
         super().__init__(path, cause)
         self.path = path
         self.cause = cause.rstrip(".")
-
-
-class Storage(Protocol):
-    """One storage file of a bag, open for reading."""
-
-    topics: Collection[Topic]
-
-    def messages(self, topics: Collection[Topic]) -> Iterator[tuple[Topic, bytes]]:
-        """Yield the messages of some topics in the order of recording."""

@@ -27,13 +27,10 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 
 from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.model.valve import Valve
-from valve_friction_ros.records.bags.rosbags_internals import TYPES, encode, header
-from valve_friction_ros.records.bags.topics import PRESSURE_TYPE, STEM_TYPE, StreamNames
+from valve_friction_ros.records.bags.rosbags_internals import TYPES
+from valve_friction_ros.records.bags.topics import PRESSURE_TYPE, STEM_TYPE, VALVE_FILE, StreamNames
 from valve_friction_ros.streams.record_buffer import Snapshot
 from valve_friction_ros.streams.samples import Samples
-
-VALVE_FILE = "valve.yaml"
-"""File name of the valve description in the folder of the bag."""
 
 _VERSION: Final = 9
 """Version of the metadata, as in ROS 2 Jazzy."""
@@ -57,7 +54,7 @@ def _messages(samples: Samples, message: object, kind: str) -> Iterator[tuple[in
 
     Encoding each message separately would take five times as long.
     """
-    data = bytearray(encode(message, kind))
+    data = bytearray(TYPES.serialize_cdr(message, kind))
     place = data.index(_VALUE.pack(_MARK))
     for stamp, value in zip(samples.stamps.tolist(), samples.values.tolist(), strict=True):
         _STAMP.pack_into(data, _STAMP_PLACE, *divmod(stamp, 1_000_000_000))
@@ -65,25 +62,20 @@ def _messages(samples: Samples, message: object, kind: str) -> Iterator[tuple[in
         yield stamp, kind, bytes(data)
 
 
-def _pressures(samples: Samples) -> Iterator[tuple[int, str, bytes]]:
-    message = TYPES.types[PRESSURE_TYPE](header=header(0), fluid_pressure=_MARK, variance=0.0)
-    return _messages(samples, message, PRESSURE_TYPE)
-
-
-def _positions(samples: Samples, joint: str) -> Iterator[tuple[int, str, bytes]]:
-    message = TYPES.types[STEM_TYPE](
-        header=header(0),
-        name=[joint] if joint else [],
+def _write(folder: Path, snapshot: Snapshot, names: StreamNames) -> None:
+    time = TYPES.types["builtin_interfaces/msg/Time"](sec=0, nanosec=0)
+    header = TYPES.types["std_msgs/msg/Header"](stamp=time, frame_id="")
+    pressure = TYPES.types[PRESSURE_TYPE](header=header, fluid_pressure=_MARK, variance=0.0)
+    stem = TYPES.types[STEM_TYPE](
+        header=header,
+        name=[names.joint] if names.joint else [],
         position=np.array([_MARK]),
         velocity=_NOTHING,
         effort=_NOTHING,
     )
-    return _messages(samples, message, STEM_TYPE)
-
-
-def _write(folder: Path, snapshot: Snapshot, names: StreamNames) -> None:
     messages = heapq.merge(
-        _pressures(snapshot.pressure), _positions(snapshot.position, names.joint)
+        _messages(snapshot.pressure, pressure, PRESSURE_TYPE),
+        _messages(snapshot.position, stem, STEM_TYPE),
     )
     with Writer(folder, version=_VERSION, storage_plugin=StoragePlugin.MCAP) as writer:
         if snapshot.rejections:
