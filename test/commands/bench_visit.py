@@ -14,6 +14,7 @@ import os
 import sys
 
 import rclpy
+from rclpy.executors import SingleThreadedExecutor
 
 from valve_friction_ros.commands.demo.bench import (
     BenchClient,
@@ -62,11 +63,13 @@ if __name__ == "__main__":
     with running_nodes(NODES, "fv_7") as processes:
         rclpy.init(args=[])
         node = rclpy.create_node("demo", namespace="fv_7")
-        client = BenchClient(node, "fv_7", RecordBuffer(BENCH_VALVE, 1.0))
+        executor = SingleThreadedExecutor()
+        executor.add_node(node)
+        client = BenchClient(node, executor, "fv_7", RecordBuffer(BENCH_VALVE, 1.0))
         try:
             answers = visit(client)
         finally:
-            client.close()
+            executor.shutdown()
             node.destroy_node()
             rclpy.try_shutdown()
     answers["exit codes"] = [process.returncode for process in processes]

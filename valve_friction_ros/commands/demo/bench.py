@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rclpy.executors import Executor
 from rclpy.node import Node
 from sensor_msgs.msg import FluidPressure, JointState
 
@@ -38,8 +39,10 @@ _ANSWER_TIMEOUT = 120.0
 class BenchClient(Caller):
     """Collects in `buffer` the samples of the bench in `namespace`, as any other node could."""
 
-    def __init__(self, node: Node, namespace: str, buffer: RecordBuffer) -> None:
-        super().__init__(node, lambda: True)
+    def __init__(
+        self, node: Node, executor: Executor, namespace: str, buffer: RecordBuffer
+    ) -> None:
+        super().__init__(node, executor, lambda: True)
         self._buffer = buffer
         self._identifier = f"/{namespace}/identifier"
         self._first_stamp: int | None = None

@@ -18,6 +18,7 @@ from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 
 import rclpy
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
@@ -280,11 +281,13 @@ def _demonstrated(options: argparse.Namespace, console: Console) -> int:
         # Python handles Ctrl-C: the handler of rclpy would end the context under the client.
         rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
         node = rclpy.create_node("demo", namespace=_NAMESPACE)
-        client = BenchClient(node, _NAMESPACE, RecordBuffer(BENCH_VALVE, 2 * _RECORD))
+        executor = SingleThreadedExecutor()
+        executor.add_node(node)
+        client = BenchClient(node, executor, _NAMESPACE, RecordBuffer(BENCH_VALVE, 2 * _RECORD))
         try:
             outcomes = _run(client, console)
         finally:
-            client.close()
+            executor.shutdown()
             node.destroy_node()
             rclpy.try_shutdown()
     status: Any = client.status  # an estimate was read from it
