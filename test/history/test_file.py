@@ -50,7 +50,7 @@ from valve_friction_ros.history import (
     tables,
 )
 from valve_friction_ros.history.entry import settings_text
-from valve_friction_ros.identification import Verdict
+from valve_friction_ros.identification import SPEED_EXPONENT, Verdict
 from valve_friction_ros.identification.trust.verdict import calibrated
 from valve_friction_ros.model import BENCH_VALVE, Drive, Recording
 
@@ -317,7 +317,11 @@ def test_points_of_the_sliding_friction_are_those_of_the_entries(history):
     baseline = Baseline(140.0, 2.0, SLIDING)
     entries = [
         success(START, sliding=SLIDING),
-        success(START + 1, sliding=replace(SLIDING, speed=8e-3)),
+        success(
+            START + 1,
+            sliding=replace(SLIDING, speed=8e-3),
+            numbers={SPEED_EXPONENT: Measured(0.5, 0.01)},
+        ),
         success(START + 2),
         success(START + 3, sliding=replace(SLIDING, speed=1e-3)),
     ]

@@ -40,7 +40,6 @@ from valve_friction_ros.streams.record_buffer import Snapshot
 _MOST_SAMPLES = 2000
 """Most samples of a stored record. Chosen: the loop of forty strokes is smooth, in 16 kB."""
 
-_NOTHING: Mapping[str, Measured] = MappingProxyType({})
 _ENDLESS = 1e300
 """Half width, N, from which an interval carries no information."""
 
@@ -292,7 +291,7 @@ def friction_point(
     parameters: Mapping[str, Parameter],
     speed: float,
     baseline: Baseline | None,
-    numbers: Mapping[str, Measured] = _NOTHING,
+    numbers: Mapping[str, Measured],
 ) -> DatedNumber | None:
     """Return the point of an identification in a trend, or None.
 

@@ -132,11 +132,10 @@ class History:
             .order_by(table.c.time_ns, table.c.id)
         )
         with reading(self.place) as connection:
+            rows = connection.execute(query).mappings().all()
             points = [
-                friction_point(time, parameters, speed, baseline)
-                for time, parameters, speed in frictions_in(
-                    connection.execute(query).mappings().all()
-                )
+                friction_point(time, parameters, speed, baseline, numbers)
+                for time, parameters, speed, numbers in frictions_in(connection, valve, rows)
             ]
         return tuple(point for point in points if point is not None)
 

@@ -393,13 +393,19 @@ def _entry(
 
 
 def frictions_in(
-    rows: Sequence[RowMapping],
-) -> Iterator[tuple[int, dict[str, Parameter], float]]:
-    """Yield time, parameters and sliding speed of each identification from parameter rows."""
-    for _, some in groupby(rows, key=lambda row: row["identification_id"]):
+    connection: Connection, valve: str, rows: Sequence[RowMapping]
+) -> Iterator[tuple[int, dict[str, Parameter], float, Mapping[str, Measured]]]:
+    """Yield time, parameters, sliding speed and numbers of each identification of a valve.
+
+    `rows` are those of its parameters.
+    """
+    ids = [row["identification_id"] for row in rows] or [0]
+    numbers = numbers_in(connection, "identification", valve, min(ids), max(ids))
+    for key, some in groupby(rows, key=lambda row: row["identification_id"]):
         several = [*some]
         parameters = {row["name"]: _parameter(row) for row in several}
-        yield several[0]["time_ns"], parameters, _number(several[0]["sliding_speed"])
+        speed = _number(several[0]["sliding_speed"])
+        yield several[0]["time_ns"], parameters, speed, numbers.get(key, {})
 
 
 def entries_in(
