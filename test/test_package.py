@@ -131,7 +131,7 @@ def test_manifest_names_every_message_package_and_library():
         elif module in DASHBOARD_LIBRARIES:
             assert path.is_relative_to(PROJECT / NAME / "dashboard")
         elif module in CLUSTER_LIBRARIES:
-            assert path == PROJECT / NAME / "fleet" / "cluster.py"
+            assert path == PROJECT / NAME / "fleet" / "workers.py"
         elif module == "upath":
             assert path == PROJECT / NAME / "records" / "files.py"
         else:
