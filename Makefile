@@ -43,8 +43,12 @@ demo: $(if $(findstring --dashboard,$(DEMO_ARGS)),venv-dashboard,venv)  ## frict
 	@"$(VENV)/bin/valve_friction" demo $(DEMO_ARGS)
 
 .PHONY: test
-test: lint  ## lint, then all tests; PYTEST_ARGS="-k name" for some
-	@"$(VENV)/bin/python" -m pytest -n 2 --dist loadfile $(PYTEST_ARGS)
+test: lint  ## lint, then all tests but the long ones; PYTEST_ARGS="-k name" for some
+	@"$(VENV)/bin/python" -m pytest -n 2 --dist loadfile -m "not slow" $(PYTEST_ARGS)
+
+.PHONY: test-long
+test-long: venv-test  ## the long tests: demos, drawn valves, whole lives of alarms
+	@"$(VENV)/bin/python" -m pytest -n 2 --dist loadfile -m slow $(PYTEST_ARGS)
 
 # What depends most on the libraries, in a few minutes: figures, reports, tables, kernels, statistics.
 OLDEST_TESTS = $(addprefix test/,test_package.py test_front_door.py model/test_simulation.py \

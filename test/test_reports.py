@@ -190,9 +190,9 @@ def rows(record, title):
 def test_excess_friction_has_the_interval_of_both(with_friction):
     """Half widths of 3 and 4 N make one of 5 N."""
     told = rows(with_friction(150.0, 3.0, baseline=Baseline(100.0, 4.0)), FRICTION)
-    assert told["friction of the healthy valve (baseline)"] == ("coulomb friction 100.0 ± 4.0 N",)
+    assert told["friction of the healthy valve (baseline)"] == ("Coulomb friction 100.0 ± 4.0 N",)
     assert told["excess friction"] == ("+50.0 ± 5.0 N",)
-    assert told["friction over baseline"][0].startswith("coulomb friction: 1.50, 95 % interval ")
+    assert told["friction over baseline"][0].startswith("Coulomb friction: 1.50, 95 % interval ")
     assert told["level"] == ("WARN, NE 107 status signal M",)
 
 

@@ -91,7 +91,7 @@ class Code(Enum):
         "; the stem ignores reversals smaller than {share,half_width:shares} % of its travel"
     )
     BASELINE = "{frictions:list |, |}"
-    BASELINE_COULOMB = "coulomb friction {value,half_width:±} N"
+    BASELINE_COULOMB = "Coulomb friction {value,half_width:±} N"
     SLIDING_SIZE = "{value,half_width:±} N at {speed:in .3g mm/s} mm/s"
     BASELINE_SLIDING = f"sliding friction {SLIDING_SIZE}"
     BASELINE_REMARK = (
@@ -431,9 +431,13 @@ def utc_second(stamp: float) -> str:
     return f"{utc(stamp):%Y-%m-%dT%H:%M:%SZ}"
 
 
-def words(name: str) -> str:
+_PEOPLE = ("coulomb", "stribeck")
+
+
+def name_in_words(name: str) -> str:
     """Write the name of a number in words."""
-    return name.replace("_", " ")
+    parts = name.split("_")
+    return " ".join(part.capitalize() if part in _PEOPLE else part for part in parts)
 
 
 def misfit_words(misfit: float, unit: str) -> str:
@@ -504,7 +508,7 @@ _LACKS = {
 
 def lack_words(of: str, lack: str, share: float, largest: float) -> str:
     """Write what a baseline lacks; `lack` is the name of a `Lack`."""
-    name = "friction from moves in service" if of == "moves" else words(of)
+    name = "friction from moves in service" if of == "moves" else name_in_words(of)
     known = {"share": share, "largest": largest}
     shares = {key: "–" if math.isnan(one) else percentage(one) for key, one in known.items()}
     return _LACKS[lack].format(of=name, **shares)
@@ -537,7 +541,7 @@ def lack_remedies(lacks: Sequence[tuple[str, str]]) -> tuple[str, ...]:
 
 def member_words(name: str | None, table: str) -> str:
     """Write an enum member in the words of a table; one that it does not have, by its name."""
-    return "" if name is None else _TABLES.get(table, {}).get(name, words(name.lower()))
+    return "" if name is None else _TABLES.get(table, {}).get(name, name_in_words(name.lower()))
 
 
 def _ago(age: int) -> str:
@@ -602,7 +606,7 @@ _FORMATS: dict[str, Callable[[Any, str], str]] = {
     "second": lambda time, _: utc_second(time),
     "times": lambda change, _: _ratio(change, ".3g", " times"),
     "two": lambda value, unit: two_digits(_SIZES.get(unit, 1.0) * value),
-    "words": lambda name, _: words(name),
+    "words": lambda name, _: name_in_words(name),
 }
 """Formats of facts: ``{fact:name details}``. ``{fact:?this|that}`` chooses by a fact, and
 ``{fact:+...}`` writes a fact only if it is known. Everything else is Python's own format."""

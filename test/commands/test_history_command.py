@@ -61,7 +61,7 @@ class TestTable:
         assert "2026-09-22 14:13:20 – refused OK too little travel: move the valve" in lines
         assert "2026-09-21 14:13:20 F_c 80.0 ± 3.0 weak OK friction normal: so" in lines
         (drift,) = (line for line in lines if "drifts" in line)
-        assert drift.startswith("trend: coulomb friction drifts by +3.00 ± 0.")
+        assert drift.startswith("trend: Coulomb friction drifts by +3.00 ± 0.")
         assert drift.endswith("N per month, over 20 days with records, 2026-09-21 to 2027-02-01")
         (limit,) = (line for line in lines if "expected on" in line)
         assert limit.startswith("trend: warn_ratio (176.2 N) expected on 2027-06-1")
@@ -72,7 +72,7 @@ class TestTable:
             history.add(success(START + day * DAY, friction))
         _, output, _ = run(path=history.path)
         assert (
-            "no significant drift of coulomb friction over 5 days with records, 2026-09" in output
+            "no significant drift of Coulomb friction over 5 days with records, 2026-09" in output
         )
         assert "month" not in output
         (valve,) = told(run, path=history.path)
@@ -119,7 +119,7 @@ class TestBaselines:
         words = " ".join(run(path=changed)[1].split())
         rows = [f"2026-{row}" for row in words.split("2026-")[1:]]
         assert ["baseline" in row for row in rows] == [False, True, False, True, True]
-        old, new = "coulomb friction 141.0 ± 1.0 N", "coulomb friction 600.0 ± 8.0 N"
+        old, new = "Coulomb friction 141.0 ± 1.0 N", "Coulomb friction 600.0 ± 8.0 N"
         assert rows[1].startswith("2026-09-22 14:13:20 baseline ERROR set_baseline: ")
         assert rows[1].strip().endswith(f"{new}; previous: {old}")
         assert rows[3].startswith("2026-09-24 14:13:20 baseline OK restore_baseline: ")

@@ -172,7 +172,7 @@ def test_a_restoration_asks_of_the_baselines_alone(question_of):
 def test_the_baseline_of_a_new_valve_is_set_from_its_estimate(question_of):
     asked = question_of(made_up(7), None)
     assert asked.old == "none"
-    assert asked.new.startswith("coulomb friction ")
+    assert asked.new.startswith("Coulomb friction ")
 
 
 @pytest.mark.parametrize(("index", "alarm"), [(0, ""), (4, "WARN")])

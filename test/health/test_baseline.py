@@ -50,15 +50,15 @@ def test_impossible_numbers(kind, numbers, name):
 
 
 def test_there_is_one_friction_at_least():
-    with pytest.raises(ValueError, match="needs a coulomb friction or a sliding friction"):
+    with pytest.raises(ValueError, match="needs a Coulomb friction or a sliding friction"):
         Baseline()
 
 
 def test_it_is_told_on_one_line():
     sliding = SlidingFriction(205.5, 3.25, 9.5e-3)
-    assert str(Baseline(152.7)) == "coulomb friction 152.7 N"
+    assert str(Baseline(152.7)) == "Coulomb friction 152.7 N"
     assert str(Baseline(152.7, 2.0, sliding)) == (
-        "coulomb friction 152.7 ± 2.0 N, sliding friction 205.5 ± 3.2 N at 9.5 mm/s"
+        "Coulomb friction 152.7 ± 2.0 N, sliding friction 205.5 ± 3.2 N at 9.5 mm/s"
     )
     assert str(Baseline(sliding=sliding)) == "sliding friction 205.5 ± 3.2 N at 9.5 mm/s"
 
@@ -97,7 +97,7 @@ class TestOfAResult:
         with pytest.raises(RefusalError) as refusal:
             Baseline.of(vague)
         assert str(refusal.value) == (
-            "this result cannot be the baseline: coulomb friction is known to ±35 %, but a "
+            "this result cannot be the baseline: Coulomb friction is known to ±35 %, but a "
             "baseline requires ±33 %; sliding friction is known to ±40 %, but a baseline requires "
             "±33 %: record more strokes, some fast and some slow, and set timing_uncertainty if "
             "the clocks and lags of both signals are known"

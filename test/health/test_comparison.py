@@ -101,7 +101,7 @@ class TestRatio:
         assert ratio.change == 0.0
 
     def test_what_it_is_of(self):
-        assert Comparison((1.0, 0.0), (1.0, 0.0)).ratio.what == "coulomb friction"
+        assert Comparison((1.0, 0.0), (1.0, 0.0)).ratio.what == "Coulomb friction"
         sliding = Comparison((1.0, 0.0), (1.0, 0.0), "sliding_friction", 9.46e-3).ratio
         assert sliding.what == "sliding friction at 9.5 mm/s"
 

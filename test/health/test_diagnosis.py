@@ -130,7 +130,7 @@ class TestLevels:
         assert (found.level, found.status_signal) == (level, signal)
         assert found.ratio.interval == (ratio, ratio, ratio)
         compared = (
-            f"{words}: coulomb friction is {ratio:.2f} ({ratio:.2f} to {ratio:.2f}) "
+            f"{words}: Coulomb friction is {ratio:.2f} ({ratio:.2f} to {ratio:.2f}) "
             "times its baseline; "
         )
         assert found.message.startswith(compared)
@@ -222,7 +222,7 @@ class TestUnknownFriction:
         found = diagnose(result, BENCH_VALVE, baseline)
         assert (found.level, found.status_signal, found.ratio) == (*NORMAL[:2], None)
         assert found.message == (
-            "coulomb friction is not identifiable: the record does not determine it"
+            "Coulomb friction is not identifiable: the record does not determine it"
         )
 
     @pytest.mark.parametrize(("bound", "collapsed"), [(1.5, True), (57.0, True), (57.1, False)])
@@ -235,7 +235,7 @@ class TestUnknownFriction:
         if collapsed:
             assert (found.level, found.status_signal) == COLLAPSED[:2]
             assert found.message == (
-                "friction collapsed, the packing may leak: coulomb friction is too small to be "
+                "friction collapsed, the packing may leak: Coulomb friction is too small to be "
                 f"identified (at most {bound:.2g} N); its baseline is 128 N"
             )
         else:
@@ -250,7 +250,7 @@ class TestUnknownFriction:
         found = diagnose(result, BENCH_VALVE, BASELINE)
         assert (found.level, found.ratio) == (Level.OK, None)
         assert found.message == (
-            "no comparison with the baseline (coulomb friction 128 N): coulomb friction is not "
+            "no comparison with the baseline (Coulomb friction 128 N): Coulomb friction is not "
             "identifiable: the record does not determine it; the baseline has no sliding friction: "
             "set it again; sliding friction 205.5 ± 3.0 N"
         )
@@ -262,7 +262,7 @@ class TestUnknownFriction:
         assert (found.level, found.status_signal) == (Level.WARN, StatusSignal.CHECK_FUNCTION)
         assert found.ratio is None
         assert found.message == (
-            "coulomb friction is −20.0 ± 3.0 N, but friction cannot be negative: check the "
+            "Coulomb friction is −20.0 ± 3.0 N, but friction cannot be negative: check the "
             "direction of both signals"
         )
 
@@ -354,7 +354,7 @@ class TestSlidingFriction:
         baseline = Baseline(128.0, 0.0, self.SLIDING)
         assert diagnose(slid(200.0, coulomb_friction=vanished), BENCH_VALVE, baseline).level == 0
         less = diagnose(slid(150.0, coulomb_friction=vanished), BENCH_VALVE, baseline)
-        assert less.message.startswith("friction collapsed, the packing may leak: coulomb ")
+        assert less.message.startswith("friction collapsed, the packing may leak: Coulomb ")
 
 
 class TestModelDoubt:
@@ -399,7 +399,7 @@ class TestWords:
             Baseline(152.7),
         )
         assert found.message == (
-            "excess friction: coulomb friction is 3.97 (3.93 to 4.01) times its baseline; "
+            "excess friction: Coulomb friction is 3.97 (3.93 to 4.01) times its baseline; "
             "the stem ignores reversals smaller than 21 % of its travel"
         )
 
@@ -423,8 +423,8 @@ class TestWords:
             with_values(coulomb_friction=friction(20.3935, 0.4)), Valve(1.0), Baseline(20.0)
         )
         assert found.message == (
-            "friction normal: coulomb friction is 1.02 (1.00 to 1.04) times its baseline; "
-            "coulomb friction 20.39 ± 0.40 N"
+            "friction normal: Coulomb friction is 1.02 (1.00 to 1.04) times its baseline; "
+            "Coulomb friction 20.39 ± 0.40 N"
         )
 
 

@@ -310,7 +310,7 @@ class TestBaseline:
             monitor.result_as_baseline()
         why = "is not identifiable (the record does not determine it)"
         assert str(refusal.value).startswith(
-            f"this result cannot be the baseline: coulomb friction {why}; sliding friction {why}: "
+            f"this result cannot be the baseline: Coulomb friction {why}; sliding friction {why}: "
             "record more strokes, "
         )
         assert monitor.baseline == before

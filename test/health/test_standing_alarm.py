@@ -80,7 +80,7 @@ def test_it_stands_with_its_date(monitor, nothing):
         assert (told.level, told.status_signal) == (Level.ERROR, StatusSignal.FAILURE)
         assert told.message.startswith(ALARM)
         assert told.message.count(DATED) == 1
-        assert told.message.split(DATED)[1].startswith("coulomb friction is not id")
+        assert told.message.split(DATED)[1].startswith("Coulomb friction is not id")
         assert told.ratio is None
 
 
@@ -285,7 +285,7 @@ class TestRestart:
         monitor = self.again(kept, OTHER if is_before else HEALTHY)
         monitor.baseline = OTHER
         assert monitor.diagnosis().level is Level.OK
-        assert monitor.diagnosis().message.startswith("coulomb friction is not identifiable")
+        assert monitor.diagnosis().message.startswith("Coulomb friction is not identifiable")
 
     def test_a_new_packing_ends_it(self, kept):
         monitor = self.again(kept)
@@ -457,7 +457,7 @@ class TestAgain:
         calm = Diagnosis(Level.OK, StatusSignal.GOOD, quoted("no baseline yet; so"), None)
         monitor = monitor_with(kept_estimate(diagnosis=calm, baseline=None))
         assert monitor.diagnosis().level == Level.ERROR
-        assert monitor.diagnosis().message.startswith("excess friction: coulomb friction is 4.00 (")
+        assert monitor.diagnosis().message.startswith("excess friction: Coulomb friction is 4.00 (")
 
     def test_other_limits_judge_it_anew_but_not_without_a_baseline(self):
         limits = FrictionLimits(1.25, 5.0)
@@ -482,4 +482,4 @@ class TestAgain:
         diagnosis = monitor.diagnosis()
         assert diagnosis.level == Level.OK
         assert str(diagnosis.doubt) == DOUBT
-        assert diagnosis.message.startswith(f"{DOUBT}; friction normal: coulomb friction is 1.00")
+        assert diagnosis.message.startswith(f"{DOUBT}; friction normal: Coulomb friction is 1.00")

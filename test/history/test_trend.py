@@ -210,7 +210,7 @@ def test_against_a_baseline_of_sliding_friction_its_limits_count():
     assert trend.crossing.limit is Limit.WARN
     assert trend.crossing.level == pytest.approx(250.0)
     assert trend.crossing.time == pytest.approx(NOON + 30 * DAY, rel=1e-6)
-    assert trend_of(rising).what == "coulomb friction"
+    assert trend_of(rising).what == "Coulomb friction"
 
 
 TIMES = np.array([0.0, 1.0, 3.0, 4.0, 7.0])

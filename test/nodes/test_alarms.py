@@ -67,7 +67,7 @@ def test_an_alarm_outlives_a_kill(live):
     node = live.start_identifier()
     after = client.next_status()
     assert after.level == ERROR
-    (line,) = (one for one in node.errors.splitlines() if "baseline coulomb friction 152.7" in one)
+    (line,) = (one for one in node.errors.splitlines() if "baseline Coulomb friction 152.7" in one)
     assert "from the history" in line
     assert client.parameters(NODE, "baseline_coulomb_friction") == [OLD.coulomb_friction]
     assert AGE.sub("", after.message) == before.message
@@ -108,7 +108,7 @@ def test_an_age_of_days(live, history):
     node = live.start_identifier()
     status = live.client.next_status()
     assert status.level == ERROR
-    assert status.message.startswith("excess friction: coulomb friction is 4.00 (")
+    assert status.message.startswith("excess friction: Coulomb friction is 4.00 (")
     assert status.message.endswith(" (identified 5 days ago, before the restart)")
     live.client.wait_until(lambda: "level OK → ERROR: excess" in node.errors, "a logged level")
 

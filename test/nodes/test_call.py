@@ -65,7 +65,7 @@ def test_all_services(bench):
     assert call(NAMESPACE, "identify", "--fail-on", "warn") == (0, f"OK: {message}\n", "")
     code, out, err = call(f"{NAMESPACE}/identifier", "set_baseline")
     assert (code, err) == (0, "")
-    assert out.startswith("baseline: coulomb friction ")
+    assert out.startswith("baseline: Coulomb friction ")
     for service in ("save", "report"):
         code, out, err = call(NAMESPACE, service)
         assert (code, err) == (0, "")

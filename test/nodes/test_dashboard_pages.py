@@ -242,7 +242,7 @@ def test_a_valve_is_identified_by_a_button(tab):
     page = tab.open(VALVE)
     page.locator("h1").get_by_text(TAG).wait_for()
     press(page, "Identify", "Identify: ")
-    row = page.locator(".vf-parameters tr").filter(has_text="coulomb friction")
+    row = page.locator(".vf-parameters tr").filter(has_text="Coulomb friction")
     row.wait_for()
     assert "± " in row.inner_text()
     assert "identified" in row.inner_text()
@@ -294,7 +294,7 @@ def test_a_baseline_is_set_only_when_it_is_agreed(tab):
     asked.get_by_text("current", exact=True).wait_for()
     words = asked.inner_text()
     assert "none" in words
-    assert "coulomb friction 152" in words
+    assert "Coulomb friction 152" in words
     page.get_by_role("button", name="Cancel").click()
     asked.wait_for(state="detached")
     assert page.locator(".vf-sub").count() == 0
@@ -370,7 +370,7 @@ def test_two_identifications_are_compared(identified, tab):
     page.locator(".vf-long tbody tr").nth(1).wait_for()
     page.locator(".vf-long a").nth(1).click()  # the one before the last
     page.locator(".vf-compared").wait_for()
-    row = page.locator(".vf-compared tr").filter(has_text="coulomb friction").inner_text()
+    row = page.locator(".vf-compared tr").filter(has_text="Coulomb friction").inner_text()
     assert "differs" in row  # of the record before, and of that with the high friction
     page.get_by_role("combobox", name="Valve of side B").click()
     page.get_by_role("option").filter(has_text="FV-103").click()

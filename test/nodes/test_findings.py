@@ -58,7 +58,7 @@ def test_verdict(client, parameters, ratio, level, signal, words):
     assert status.message == message
     values = values_of(status)
     assert (status.level, values["NE 107"]) == (level, signal)
-    of, told, near = "coulomb_friction", "coulomb friction", 2e-3
+    of, told, near = "coulomb_friction", "Coulomb friction", 2e-3
     if ratio is None:
         speed = float(values["baseline_sliding_friction speed [m/s]"])
         # With more friction the stem is slower, and between two speeds friction may have fallen.

@@ -70,9 +70,9 @@ class TestBaseline:
         history.set_baseline(VALVE, KeptBaseline(Baseline(152.7, 1.0), START, START))
         node = live.start_identifier({"baseline_coulomb_friction": 140.0})
         assert float(first_values(live)["baseline_coulomb_friction [N]"]) == 140.0
-        (line,) = logged(live, node, "baseline coulomb friction 140 N")
+        (line,) = logged(live, node, "baseline Coulomb friction 140 N")
         assert "from the parameter baseline_coulomb_friction" in line
-        assert "not used: baseline coulomb friction 152.7 ± 1.0 N, set 2026-09-21 14:13 UTC" in line
+        assert "not used: baseline Coulomb friction 152.7 ± 1.0 N, set 2026-09-21 14:13 UTC" in line
 
     def test_one_of_the_sliding_friction_alone_ends_with_nan(self, live, history):
         """The parameter shows nan all the time; only setting it ends the baseline."""

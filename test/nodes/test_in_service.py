@@ -250,7 +250,7 @@ def test_the_newer_of_identification_and_moves_leads_and_is_the_baseline(live, h
     status = client.next_status(lambda status: "has grown" in status.message, "the growth")
     assert status.message.startswith("friction has grown: sliding friction")
     dated = " (identified earlier, 2023-11-14 22:13 UTC)"
-    _, _, before = status.message.partition("; friction normal: coulomb friction is 1.00")
+    _, _, before = status.message.partition("; friction normal: Coulomb friction is 1.00")
     assert dated in before
     assert client.set_together(NODE, {"baseline_in_alarm": True}).successful
     answer = client.trigger("set_baseline")

@@ -107,7 +107,7 @@ def test_the_trend_and_the_signature_of_the_baseline_are_those_of_the_history(li
     _, page = report(client)
     assert page.said("h2")[2:4] == ["Friction compared with its baseline", "Trend"]
     (told,) = (text for text in page.said("p") if "Drift of the " in text)
-    assert re.match(r"[78] identifications on 7 days\. Drift of the coulomb friction: \+", told)
+    assert re.match(r"[78] identifications on 7 days\. Drift of the Coulomb friction: \+", told)
     assert [one for one in page.said("figcaption") if "Grey: the record of the baseline" in one]
     assert any("; identified 20" in text for text in page.said("p"))
 

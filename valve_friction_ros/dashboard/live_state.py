@@ -28,7 +28,7 @@ from valve_friction_ros.health import (
 )
 from valve_friction_ros.outside_text import printable
 from valve_friction_ros.settings import ALARM_KINDS
-from valve_friction_ros.wording import alarm_advice, number_and_width
+from valve_friction_ros.wording import alarm_advice, name_in_words, number_and_width
 
 _KEY = re.compile(r"(?P<name>.*?)(?: \[(?P<unit>[^\]]*)\])?")
 _LONGEST_TEXT = 400
@@ -111,7 +111,7 @@ def _entry(key: str, text: str) -> Entry:
     else:
         shown = f"{value:.0f}" if abs(value) < 1e9 and value == round(value) else f"{value:.4g}"
     unit = "" if unit in ("date", "time", "1") else unit
-    return Entry(printable(name.replace("_", " "), _LONGEST_TEXT), shown, printable(unit, 40))
+    return Entry(printable(name_in_words(name), _LONGEST_TEXT), shown, printable(unit, 40))
 
 
 _CHANGE = " change"

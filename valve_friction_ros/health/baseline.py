@@ -18,7 +18,15 @@ from valve_friction_ros.health.measured import Measured
 from valve_friction_ros.health.valve_numbers import valve_numbers
 from valve_friction_ros.identification import SLIDING, Parameter, RefusalError, Result
 from valve_friction_ros.model.checks import require_non_negative, require_positive
-from valve_friction_ros.wording import MORE_STROKES, Code, Statement, lack_words, said, sentence
+from valve_friction_ros.wording import (
+    MORE_STROKES,
+    Code,
+    Statement,
+    lack_words,
+    name_in_words,
+    said,
+    sentence,
+)
 
 GOOD_SHARE, LARGEST_SHARE = 0.13, 0.33
 """Largest half width of a friction, over its value, in a good baseline and in any baseline.
@@ -156,7 +164,7 @@ class Baseline:
     >>> import valve_friction_ros as vf
     >>> healthy = vf.Baseline(coulomb_friction=150.0, half_width=2.0)
     >>> print(healthy)
-    coulomb friction 150.0 ± 2.0 N
+    Coulomb friction 150.0 ± 2.0 N
     """
 
     coulomb_friction: float | None = None
@@ -169,7 +177,7 @@ class Baseline:
         if self.coulomb_friction is not None:
             require_positive("baseline_coulomb_friction", self.coulomb_friction)
         elif self.sliding is None:
-            raise ValueError("a baseline needs a coulomb friction or a sliding friction")
+            raise ValueError("a baseline needs a Coulomb friction or a sliding friction")
         require_non_negative("half_width", self.half_width)
 
     @property
@@ -209,7 +217,7 @@ class Baseline:
         for one in frictions.values():
             if one.value < 0:
                 raise BaselineRefusalError(
-                    f"a {one.name.replace('_', ' ')} of {one.value:.4g} N cannot be a baseline: "
+                    f"a {name_in_words(one.name)} of {one.value:.4g} N cannot be a baseline: "
                     "check the direction of both signals, then identify again",
                     BaselineLack(one.name, Lack.SIZE),
                 )
@@ -281,7 +289,7 @@ def _lacks(frictions: Mapping[str, Parameter]) -> dict[str, BaselineLack]:
 
 
 def _why_not(friction: Parameter, lack: BaselineLack) -> str:
-    name = friction.name.replace("_", " ")
+    name = name_in_words(friction.name)
     if lack.lack is Lack.VALUE:
         return f"{name} is not identifiable ({friction.reason})"
     if lack.lack is Lack.SIZE:

@@ -34,7 +34,7 @@ from valve_friction_ros.identification import (
 )
 from valve_friction_ros.reports.identified_record import IdentifiedRecord, began
 from valve_friction_ros.reports.page import Column, PageTable, Verbatim
-from valve_friction_ros.wording import in_zone, percentage, with_width
+from valve_friction_ros.wording import in_zone, name_in_words, percentage, with_width
 
 _WORDS = {
     "mass": "moving mass m",
@@ -64,7 +64,7 @@ def written(value: float | None) -> str:
 
 def words_of(name: str) -> str:
     """Return the name of a parameter in words, with its symbol."""
-    return _WORDS.get(name, name.replace("_", " "))
+    return _WORDS.get(name, name_in_words(name))
 
 
 def _heading(name: str, one: Mapping[str, Any]) -> str:
@@ -288,7 +288,7 @@ def valve_table(record: IdentifiedRecord) -> PageTable | None:
     now, healthy = record.numbers, record.baseline.numbers
     rows = tuple(
         (
-            f"{name.replace('_', ' ')} [{units[name]}]",
+            f"{name_in_words(name)} [{units[name]}]",
             _size(healthy[name]),
             _size(now[name]),
             _change(change, is_ratio=name not in DIFFERENCES),

@@ -49,6 +49,7 @@ from valve_friction_ros.dashboard.plant_rows import (
     summary,
 )
 from valve_friction_ros.history import HistoryError, ValveHistory
+from valve_friction_ros.wording import name_in_words
 
 _PERIOD = 1.0
 _FIRST_PERIOD, _FIRST_TIME = 0.25, 10.0
@@ -331,7 +332,7 @@ class _ComparePage:
                     table_row(*((w, "" if w == name else "vf-n") for w in (name, *words, "", "")))
                 for row in compared(one, other):
                     numbers = (*map(quantity_words, (row.one, row.other)), row.ratio_words)
-                    name = row.name.replace("_", " ")
+                    name = name_in_words(row.name)
                     cells = ((name, ""), *((each, "vf-n") for each in numbers))
                     with table_row(*cells), element("td"):
                         if row.verdict:

@@ -47,7 +47,7 @@ from valve_friction_ros.health import AlarmEvent
 from valve_friction_ros.history import HistoryEntry, ValveHistory, drift_text
 from valve_friction_ros.outside_text import printable
 from valve_friction_ros.streams import utc_day
-from valve_friction_ros.wording import capitalised, number_and_width
+from valve_friction_ros.wording import capitalised, name_in_words, number_and_width
 
 _VERDICTS = {"identified": "ok", "weak": "warn", "not identifiable": "unknown", "fixed": "unknown"}
 _TITLES = (("parameter", ""), ("value", "vf-n"), ("", "vf-width"), ("", ""), ("verdict", ""))
@@ -71,7 +71,7 @@ def draw_parameters(view: ValveView) -> None:
 def _draw_parameter(one: Quantity) -> None:
     value, width = quantity_texts(one)
     shown = ((value, "vf-n"), (width, "vf-width"), (one.unit, "vf-unit"))
-    with table_row((one.name.replace("_", " "), ""), *shown), element("td"):
+    with table_row((name_in_words(one.name), ""), *shown), element("td"):
         chip(_VERDICTS.get(one.verdict, "unknown"), one.verdict or "–")
         if one.reason:
             text("small", one.reason, "vf-reason")

@@ -63,7 +63,7 @@ from valve_friction_ros.dashboard.plant_rows import (
 from valve_friction_ros.health import AlarmEvent
 from valve_friction_ros.history import AlarmFilter, HistoryError, ValveHistory
 from valve_friction_ros.outside_text import printable
-from valve_friction_ros.wording import lack_remedies
+from valve_friction_ros.wording import lack_remedies, name_in_words
 
 
 class _ValveHead:
@@ -157,7 +157,7 @@ _ACTIONS = {
 
 
 def _frictions(found: tuple[Quantity, ...]) -> str:
-    words = (f"{one.name.replace('_', ' ')} {quantity_words(one)}" for one in found)
+    words = (f"{name_in_words(one.name)} {quantity_words(one)}" for one in found)
     return "; ".join(words) or "none"
 
 
