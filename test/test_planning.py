@@ -389,6 +389,7 @@ def test_calibration_and_timing_widen_a_forecast():
     assert width("viscous_friction", timing_uncertainty=0.1) > 1.2 * certain
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [70_000, 70_006, 70_011])
 def test_valves_that_the_planner_does_not_know(seed):
     """Other code, other physics, frictions that are wrong by a factor of 2; seeds held back."""

@@ -393,6 +393,7 @@ class TestWebSocket:
         for cookies in (None, {"valve_friction": "x"}):
             asyncio.run(refused(Socket(private, page, cookies, transport=transport)))
 
+    @pytest.mark.slow
     def test_none_from_a_foreign_page(self, local, private, transport):
         async def visit(url, client):
             with closing(client):
@@ -405,6 +406,7 @@ class TestWebSocket:
         asyncio.run(visit(local, visitor(local)))
         asyncio.run(visit(private, logged_in(private)))
 
+    @pytest.mark.slow
     def test_who_may_view_may_not_operate(self, private, transport):
         before = operations(private)
 
@@ -536,6 +538,7 @@ def opened():
         yield stack.enter_context
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("source", ["127.0.0.2", "127.0.0.1"])
 def test_1100_half_requests_do_not_take_the_pages(page, opened, source):
     """Neither from another client, nor from the client's own address."""
@@ -566,6 +569,7 @@ def time_until_the_end(made, slowly):
     return time.monotonic() - begun
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("sent", "slowly"), [(b"", b""), (HALF, b""), (HALF, b"X-Slow: 1\r\n")])
 def test_half_a_request_ends_after_ten_seconds(page, opened, sent, slowly):
     """Without a byte, as browsers do, which is not logged; within the headers, slow ones too."""
@@ -575,6 +579,7 @@ def test_half_a_request_ends_after_ten_seconds(page, opened, sent, slowly):
     assert (told in page.output.read_text()) is bool(sent)
 
 
+@pytest.mark.slow
 def test_pages_that_are_open_live_on(page, opened):
     """A WebSocket outlives the time for requests, and a crowd of its own address."""
     address = page.url.replace("http", "ws") + POLLING.replace("polling", "websocket")

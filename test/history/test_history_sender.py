@@ -339,6 +339,7 @@ class TestAnotherMachine:
             wait_until_sent(sender)
         assert len(history.entries()) == 1
 
+    @pytest.mark.slow
     def test_a_server_that_stands_still_is_not_waited_for(self, history, database, postgres):
         with sending(history, database) as sender:
             assert sender.take(VALVE) is None

@@ -96,6 +96,7 @@ def samples_in(bag):
         return reader.message_count
 
 
+@pytest.mark.slow
 def test_an_alarm_is_recorded_and_the_whole_takes_the_place_of_its_first_part(live, history):
     baseline_set(live, {"alarm_recording": 10.0, "alarm_recordings": 1})
     client = live.client
@@ -147,6 +148,7 @@ def small_disk(tmp_path):
     subprocess.run(["umount", "-l", str(folder)], check=True)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("reason", ["No space left on device", "Not a directory"])
 def test_what_cannot_be_written_is_told_and_no_torn_bag_stays(
     live, history, tmp_path, reason, request
@@ -191,6 +193,7 @@ def test_it_is_named_after_a_restart(live, history, tmp_path):
     assert not history.path.with_name("alarms").exists()
 
 
+@pytest.mark.slow
 def test_many_alarms_are_bounded_and_nothing_else_is_removed(live, tmp_path):
     folder = tmp_path / "plant" / "alarms"
     others = [
@@ -228,6 +231,7 @@ def test_many_alarms_are_bounded_and_nothing_else_is_removed(live, tmp_path):
     client.wait_until(lambda: names(folder) == sorted(others), "no recording")
 
 
+@pytest.mark.slow
 def test_a_level_that_flaps_is_recorded_once(live):
     baseline_set(live, {"alarm_pause": 3600.0})
     client = live.client
@@ -240,6 +244,7 @@ def test_a_level_that_flaps_is_recorded_once(live):
     assert names(path.parent) == [path.name]
 
 
+@pytest.mark.slow
 def test_what_is_not_recorded(live, tmp_path):
     """Silent inputs, the end of a packing's life, and friction where it is switched off."""
     node = live.start_identifier({**FAST, "reversal_limit": 1.0})

@@ -159,6 +159,7 @@ def test_a_history_that_goes_while_the_node_runs_costs_no_baseline(live, history
     assert client.next_status().level == ERROR
 
 
+@pytest.mark.slow
 def test_two_nodes_of_one_valve_are_told(live):
     live.start_identifier()
     first = live.nodes[-1]
@@ -292,6 +293,7 @@ def test_settings_name_the_alarms():
     assert tuple(one.value for one in AlarmKind) == ALARM_KINDS
 
 
+@pytest.mark.slow
 def test_a_life_of_an_alarm(live, history):
     node = live.start_identifier(KNOWN)
     client = live.client

@@ -160,6 +160,7 @@ def test_the_token_goes_only_to_the_address_beside_it(live, monkeypatch):
     require_no_secret(live, node)
 
 
+@pytest.mark.slow
 def test_what_is_found_on_a_valve_is_told_once_whatever_restarts(live, history):
     """A packing whose life is over, known from the history at each start; no level of friction."""
     used = UsedDay(20_000, 0, Usage(1.0, 50, 2, (10**9, *[0] * (BINS - 1))))
@@ -190,6 +191,7 @@ def test_what_is_found_on_a_valve_is_told_once_whatever_restarts(live, history):
     assert old["friction_ratio"] is None
 
 
+@pytest.mark.slow
 def test_what_waited_at_a_kill_is_told_after_the_restart(live, history):
     with Receiver() as first:
         url, port = first.url, first.port

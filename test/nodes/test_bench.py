@@ -344,6 +344,7 @@ def plan():
     return plan_test(BENCH_VALVE, frictions, Limits(duration=30.0), Conditions(TEST_RATE), settings)
 
 
+@pytest.mark.slow
 def test_what_is_reported_is_what_was_promised(live, plan, tmp_path):
     file = tmp_path / "stroke_test.csv"
     write_test(file, plan)

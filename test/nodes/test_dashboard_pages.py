@@ -347,6 +347,7 @@ def test_a_recording_is_saved(tab):
     page.locator(".vf-stack a").filter(has_text=".mcap").first.wait_for()
 
 
+@pytest.mark.slow
 def test_signals_are_heard_while_the_page_is_open(identified, tab):
     client, topic = identified.client, f"{NAMESPACE}/actuator_pressure"
     client.wait_until(lambda: client.node.count_subscribers(topic) == 1, "no other listener")
@@ -478,6 +479,7 @@ def test_what_cannot_be_called_says_so(tab):
 # Restarts, the last of this file
 
 
+@pytest.mark.slow
 def test_an_identifier_that_ends_falls_silent_and_comes_back(plant, tab):
     page = tab.open(VALVE)
     page.locator(".vf-chip").first.wait_for()

@@ -102,6 +102,7 @@ HEALTHY, TIGHT, LOOSE = quick_record(), quick_record(HIGH_FRICTION), record_of(0
 UNSURE = SensorNoise(15e-5, 300.0, seed=1).applied_to(record_of(1.42))
 
 
+@pytest.mark.slow
 def test_an_alarm_ends_by_a_sure_result_only_also_over_a_restart(live):
     node = live.start_identifier(NARROW)
     client = live.client

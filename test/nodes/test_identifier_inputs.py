@@ -92,6 +92,7 @@ def sends_until_taken(client, made):
     client.wait_until(is_taken, "samples of the stem")
 
 
+@pytest.mark.slow
 def test_best_effort_and_reliable_publishers_alike(client):
     best_effort = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
     for quality in (best_effort, STREAM, best_effort):

@@ -79,6 +79,7 @@ def identifying_processes(pid):
     ]
 
 
+@pytest.mark.slow
 def test_processes_identify_and_may_die(live):
     parameters = {"valves": ["fv_101"], "identification_processes": 1, "input_timeout": 600.0}
     process = live.start("identifiers", parameters, namespace=None)
@@ -177,6 +178,7 @@ def times(pid):
     return np.array([used, time.monotonic()])
 
 
+@pytest.mark.slow
 def test_a_storm_on_one_valve_is_bounded_work_and_leaves_the_other_its_turn(storm):
     """The times are those of the process: what others do on this machine is none of its work.
 
@@ -208,6 +210,7 @@ def test_a_storm_on_one_valve_is_bounded_work_and_leaves_the_other_its_turn(stor
     assert int(values["averaged_samples"]) >= 2
 
 
+@pytest.mark.slow
 def test_lost_messages_are_a_warning_with_their_share_until_it_is_over(live):
     """A queue of ten takes a burst of a thousand."""
     depth = "qos_overrides./fv_101/actuator_pressure.subscription.depth"

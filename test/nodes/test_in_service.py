@@ -50,6 +50,7 @@ def shown(client, key, value):
     )
 
 
+@pytest.mark.slow
 def test_usage_is_shown_kept_and_goes_on(live, history):
     node = live.start_identifier()
     client = live.client
@@ -184,6 +185,7 @@ def number(values, key):
     return float(values.get(f"evidence {key}", "nan"))
 
 
+@pytest.mark.slow
 def test_it_adds_up_and_survives_a_kill(live, history):
     node, client = live.start_identifier(SECURE), live.client
 
@@ -262,6 +264,7 @@ def test_the_newer_of_identification_and_moves_leads_and_is_the_baseline(live, h
     assert kept.numbers["spring_constant"].value == pytest.approx(2.05e5, rel=0.01)
 
 
+@pytest.mark.slow
 def test_a_renewed_packing_a_wrong_stamp_and_another_actuator(live):
     client = live.client_of_identifier(SECURE)
     serve(client, 0, 300.0)
@@ -347,6 +350,7 @@ def test_moves_in_service(live, unit, scale):
     assert "the actuator pressure itself responds late: check the positioner" in status.message
 
 
+@pytest.mark.slow
 def test_the_figures_outlive_a_kill(live, history):
     """They are kept, shown by a node that hears no command yet, in its page and by a command."""
     slow = {"window": 3600.0, "dead_time_limit": 0.8}

@@ -114,6 +114,7 @@ class TestOneOfSeveral:
             live.client.node.get_service_names_and_types()
         )
 
+    @pytest.mark.slow
     def test_that_fails_while_it_runs(self, live, tmp_path):
         """At its start already, then in its diagnostics; each time the others go on."""
         process = self.start(live, tmp_path, "", faulty("one_raising"))

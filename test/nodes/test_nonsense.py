@@ -150,6 +150,7 @@ def node(live, history):
     return live.start("identifiers", parameters, namespace=None)
 
 
+@pytest.mark.slow
 def test_nonsense_is_told_within_5_s_cleared_after_it_and_nothing_else_is(live, node, sensors):
     plant = Plant(live.client, sensors)
     plant.spin(sensors.are_connected, "connections", PATIENCE)

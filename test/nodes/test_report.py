@@ -40,6 +40,7 @@ def bench(shared, tmp_path_factory):
     return shared.client, folder
 
 
+@pytest.mark.slow
 def test_the_last_estimate_is_drawn_from_its_own_record(bench):
     client, folder = bench
     before = client.trigger("report")

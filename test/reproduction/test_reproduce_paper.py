@@ -34,6 +34,7 @@ def page(reproduced):
     return PageReader((reproduced.output / "reproduction.html").read_text(encoding="utf-8"))
 
 
+@pytest.mark.slow
 def test_the_report_and_every_figure_are_written(reproduced):
     assert reproduced.code == 0
     names = {path.name for path in reproduced.output.iterdir()}

@@ -163,6 +163,7 @@ class TestOfARecord:
         assert (one["cause"], one["pressure"]) == ("area scale", None)
 
 
+@pytest.mark.slow
 def test_twenty_drawn_valves_contradict_nothing():
     """Sizes of small to large actuators, all data right within the ±10 % of a catalogue."""
     random = np.random.default_rng(26)
