@@ -384,6 +384,17 @@ class HistoryWriter:
         with self._failures_remembered():
             await self._written(change)
 
+    async def keep_step(self, change: _Change) -> None:
+        """Make a change like `keep_change`, but leave the trend as it is.
+
+        All alarms of a plant may be answered at once.
+        """
+        if self._file is None:
+            return
+        self._waiting.add(change)
+        with self._failures_remembered():
+            await done_in(self._writer, self._write_waiting, self._file, time.monotonic())
+
     def keep_soon(self, change: _Change) -> None:
         """Queue a change for the thread of the writer; `settle` processes the outcome.
 
