@@ -24,6 +24,7 @@ from rclpy.duration import Duration
 from sensor_msgs.msg import FluidPressure, JointState
 from std_msgs.msg import String
 
+from valve_friction_ros.nodes.plumbing.messages import position_of
 from valve_friction_ros.nodes.plumbing.parameters import declare_parameters, values_of
 from valve_friction_ros.nodes.plumbing.polled_node import PacedNode, create_service
 from valve_friction_ros.nodes.plumbing.polled_subscription import PolledSubscription
@@ -105,15 +106,8 @@ class StrokePlayer(PacedNode):
         for taken in self._pressures.take():
             self._test.heard_pressure(taken.message.fluid_pressure, now)
         for taken in self._stems.take():
-            self._test.heard_stem(self._position(taken.message), now)
-
-    def _position(self, message: JointState) -> float:
-        """Return the position of the stem in a message, or nan without one."""
-        names, positions = list(message.name), message.position
-        place = names.index(self._joint) if self._joint in names else 0
-        if (self._joint and self._joint not in names) or place >= len(positions):
-            return math.nan
-        return float(positions[place])
+            place = position_of(taken.message, self._joint)
+            self._test.heard_stem(math.nan if place is None else place, now)
 
     def step(self) -> float:
         """Publish the set point that is due; return the time of the next step."""
