@@ -46,7 +46,7 @@ from valve_friction_ros.model import (
     converter_response,
 )
 from valve_friction_ros.streams import Samples, Snapshot
-from valve_friction_ros.wording import Code, said
+from valve_friction_ros.wording import Code, name_in_words, said
 
 SETTINGS = MonitorSettings(BENCH_VALVE)
 START = 1_700_000_000_000_000_000
@@ -295,7 +295,7 @@ class TestBaseline:
         with pytest.raises(RefusalError) as refusal:
             monitor.result_as_baseline()
         assert str(refusal.value) == (
-            f"a {name.replace('_', ' ')} of -3 N cannot be a baseline: check the direction of "
+            f"a {name_in_words(name)} of -3 N cannot be a baseline: check the direction of "
             "both signals, then identify again"
         )
         assert refusal.value.lacks == monitor.baseline_lacks() == (BaselineLack(name, Lack.SIZE),)
