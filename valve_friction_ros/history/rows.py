@@ -50,6 +50,7 @@ from valve_friction_ros.history.entry import (
 from valve_friction_ros.history.tables import joined, put
 from valve_friction_ros.identification import (
     PARAMETER_UNITS,
+    SPEED_EXPONENT,
     Parameter,
     Verdict,
     current_name,
@@ -292,15 +293,20 @@ def record_in(connection: Connection, baseline: int) -> Recording | None:
 
 
 def numbers_in(
-    connection: Connection, owner: str, valve: str, first: int, last: int
+    connection: Connection, owner: str, valve: str, first: int, last: int, *names: str
 ) -> dict[int, dict[str, Measured]]:
-    """Return the numbers of a valve's rows `first` to `last` of the table `owner`, by row."""
+    """Return the numbers of a valve's rows `first` to `last` of the table `owner`, by row.
+
+    With `names`, only the numbers of these names are read.
+    """
     table, owners = _NUMBERS[owner], tables.METADATA.tables[owner]
     query = (
         sa.select(table)
         .select_from(joined(table, owners, tables.valve))
         .where(tables.valve.c.name == valve, owners.c.id.between(first, last))
     )
+    if names:
+        query = query.where(table.c.name.in_(names))
     found: defaultdict[int, dict[str, Measured]] = defaultdict(dict)
     for row, name, value, width in connection.execute(query):
         found[row][name] = Measured(value, width)
@@ -395,12 +401,13 @@ def _entry(
 def frictions_in(
     connection: Connection, valve: str, rows: Sequence[RowMapping]
 ) -> Iterator[tuple[int, dict[str, Parameter], float, Mapping[str, Measured]]]:
-    """Yield time, parameters, sliding speed and numbers of each identification of a valve.
+    """Yield what `friction_point` needs of each identification: time, parameters, speed, exponent.
 
-    `rows` are those of its parameters.
+    `rows` are those of the parameters of one valve; the exponent is in a mapping of numbers.
     """
     ids = [row["identification_id"] for row in rows] or [0]
-    numbers = numbers_in(connection, "identification", valve, min(ids), max(ids))
+    owner, span = "identification", (min(ids), max(ids))
+    numbers = numbers_in(connection, owner, valve, *span, SPEED_EXPONENT)
     for key, some in groupby(rows, key=lambda row: row["identification_id"]):
         several = [*some]
         parameters = {row["name"]: _parameter(row) for row in several}
