@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from valve_friction_ros.identification.trust.uncertainty import MEDIAN_MAGNITUDE
 from valve_friction_ros.model.checks import require_non_negative, require_positive
 from valve_friction_ros.signals import quantisation_step
-from valve_friction_ros.streams import DAY
+from valve_friction_ros.streams import DAY, END_OF_TIME
 from valve_friction_ros.streams.samples import Samples
 from valve_friction_ros.wording import Code, Statement, said, sentence
 
@@ -556,7 +556,6 @@ LEAD = 30 * DAY
 and plan its renewal."""
 _DATE_DOUBT = 2 * DAY
 """Time, ns, by which the expected date may recede until the end of the day of the warning."""
-_END_OF_TIME = 2**63 - 1
 
 
 @dataclass(frozen=True)
@@ -650,7 +649,7 @@ def limit_states(
         if limit > 0:
             days = (limit - value) / daily if daily else math.inf
             date = now + days * DAY
-            expected = round(date) if value < limit and date < _END_OF_TIME else None
+            expected = round(date) if value < limit and date < END_OF_TIME else None
             found.append(LimitState(name, value, limit, expected, now))
     return tuple(found)
 

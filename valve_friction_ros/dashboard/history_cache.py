@@ -51,7 +51,7 @@ from valve_friction_ros.history.status_values import (
     trend_values,
 )
 from valve_friction_ros.model.valve import Valve
-from valve_friction_ros.streams import DAY
+from valve_friction_ros.streams import DAY, END_OF_TIME
 
 if TYPE_CHECKING:
     from valve_friction_ros.history import HistoryMark, KeptRatio
@@ -245,9 +245,6 @@ class HistoryCache:
             return self._histories[node]
 
 
-_FOREVER = 2**63 - 1
-
-
 def _status_of(kept: ValveHistory) -> Status:
     """Return the status of a valve as its identifier would publish it, without alarms.
 
@@ -325,7 +322,7 @@ class KeptValves(HistoryCache):
         for valve in self.valves:
             try:
                 if valve not in self._statuses:
-                    found = database.valve_histories(self._history, (valve,), 0, _FOREVER)
+                    found = database.valve_histories(self._history, (valve,), 0, END_OF_TIME)
                     self._statuses[valve] = [_status_of(one) for one in found]
                 alarms = database.read_alarms(self._history, valve.name)
                 statuses = [_with_alarms(one, alarms) for one in self._statuses[valve]]

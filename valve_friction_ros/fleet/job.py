@@ -137,7 +137,7 @@ def filed_before(place: Path, tags: Iterable[str]) -> set[tuple[str, int]]:
     if not place.exists():
         return set()
     names = {kept_valve(tag).name: tag for tag in tags}
-    entries = HistoryFile(place).entries(list(names), 0, 2**63 - 1)
+    entries = HistoryFile(place).entries(list(names), 0)
     return {
         (names[one.valve.name], one.span.begin // 10**9)
         for one in entries

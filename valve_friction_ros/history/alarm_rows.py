@@ -44,12 +44,12 @@ from valve_friction_ros.health.levels import Level, StatusSignal
 from valve_friction_ros.history import tables
 from valve_friction_ros.history.database import reading, writing
 from valve_friction_ros.history.entry import KeptValve
-from valve_friction_ros.history.history import END_OF_TIME, History, HistoryFile
+from valve_friction_ros.history.history import History, HistoryFile
 from valve_friction_ros.history.place import file_state
 from valve_friction_ros.history.rows import oldest_kept, valve_id
 from valve_friction_ros.history.tables import joined, put
 from valve_friction_ros.outside_text import csv_text
-from valve_friction_ros.streams import utc
+from valve_friction_ros.streams import END_OF_TIME, utc
 
 _EVENT = tables.alarm_event
 

@@ -44,9 +44,7 @@ from valve_friction_ros.history.rows import (
 from valve_friction_ros.history.tables import joined, of_valve
 from valve_friction_ros.identification import FORMER_METHODS, SLIDING
 from valve_friction_ros.model.valve import Valve
-
-END_OF_TIME = 2**63 - 1
-"""Largest integer in both databases."""
+from valve_friction_ros.streams import END_OF_TIME
 
 
 def _dated(table: sa.Table, valve: str, since: int, until: int = END_OF_TIME) -> Any:

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from valve_friction_ros.streams.samples import (
         COLUMNS as COLUMNS,
         DAY as DAY,
+        END_OF_TIME as END_OF_TIME,
         Arrivals as Arrivals,
         Kind as Kind,
         Samples as Samples,

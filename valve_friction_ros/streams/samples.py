@@ -26,6 +26,9 @@ from valve_friction_ros.model.recording import Recording, StampedRecord, Stamped
 DAY = 86_400_000_000_000
 """A day, ns."""
 
+END_OF_TIME = 2**63 - 1
+"""Latest stamp, ns since 1970; the largest integer in SQLite and PostgreSQL."""
+
 
 _CHUNK = 1024
 """Samples that are kept and dropped together. Chosen: about 1 s at 1 kHz."""

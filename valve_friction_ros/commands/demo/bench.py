@@ -33,7 +33,7 @@ from valve_friction_ros.nodes.service_call import Caller
 from valve_friction_ros.streams import RecordBuffer
 from valve_friction_ros.wording import Code, said
 
-_ANSWER_TIMEOUT = 120.0
+ANSWER_TIMEOUT = 120.0
 
 
 class BenchClient(Caller):
@@ -104,7 +104,7 @@ class BenchClient(Caller):
 
     def trigger(self, service: str) -> str:
         """Call a service of the identifier and return its message; raises RefusalError."""
-        answer = self.call(self._identifier, service, _ANSWER_TIMEOUT)
+        answer = self.call(self._identifier, service, ANSWER_TIMEOUT)
         if answer is None or not answer.success:
             raise RefusalError(f"{service}: {answer.message if answer else 'no answer'}")
         return answer.message

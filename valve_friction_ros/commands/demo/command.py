@@ -26,6 +26,7 @@ from rich.table import Table
 
 from valve_friction_ros.commands.console import OutputConsole
 from valve_friction_ros.commands.demo.bench import (
+    ANSWER_TIMEOUT,
     BenchClient,
     NodeProcess,
     free_domain,
@@ -73,7 +74,6 @@ The mass is given. A published F_s is read from single samples.
 """
 _INTERVALS = 3.0
 """Tolerated error of an identified value, in half widths of its interval."""
-_ANSWER_TIMEOUT = 120.0
 _NEWEST = 2.0
 """Age, s, up to which a diagnosed estimate is the one just requested."""
 
@@ -114,7 +114,7 @@ def identified(client: BenchClient, label: str, truth: KarnoppParameters) -> Out
     client.trigger("identify")
     client.wait(
         lambda: float(client.diagnostic_values.get("estimate_age [s]", "inf")) < _NEWEST,
-        _ANSWER_TIMEOUT,
+        ANSWER_TIMEOUT,
         "diagnostic of the estimate",
     )
     values = client.diagnostic_values

@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 from rich.console import Console
 
-from valve_friction_ros.commands.demo.bench import NodeProcess, running_nodes
+from valve_friction_ros.commands.demo.bench import ANSWER_TIMEOUT, NodeProcess, running_nodes
 from valve_friction_ros.commands.process import ExitCode
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.model import BENCH_VALVE, SquareWave
@@ -33,7 +33,6 @@ _REST = _RECORD
 """Time between a change of the packings and the identification, s: the record is new by then."""
 _FRICTION = 300.0
 _START_TIMEOUT = 90.0
-_ANSWER_TIMEOUT = 120.0
 
 
 class PlantValve(NamedTuple):
@@ -115,7 +114,7 @@ def _tell(client: Caller, console: Console) -> None:
     while True:
         for valve in VALVES:
             packing = _packing(valve.friction(step))
-            client.set_parameters(f"/{valve.name}/simulator", packing, _ANSWER_TIMEOUT)
+            client.set_parameters(f"/{valve.name}/simulator", packing, ANSWER_TIMEOUT)
             _call(client, valve, "clear")
         time.sleep(_REST)
         for valve in VALVES:
@@ -129,7 +128,7 @@ def _tell(client: Caller, console: Console) -> None:
 
 def _call(client: Caller, valve: PlantValve, service: str) -> str:
     """Call a service of an identifier; return its answer, even if it reports a failure."""
-    answer = client.call(f"/{valve.name}/identifier", service, _ANSWER_TIMEOUT)
+    answer = client.call(f"/{valve.name}/identifier", service, ANSWER_TIMEOUT)
     if answer is None:  # only if it is no longer wanted
         raise KeyboardInterrupt
     level = "" if answer.level is None else f"{answer.level.name}: "

@@ -392,16 +392,16 @@ class AlarmStates:
 
     def _draw_alarm(self, one: ValveAlarm) -> None:
         css = one.level.lower() if one.is_told else "unknown"
-        name = one.kind.replace("_", " ")
+        kind = AlarmKind(one.kind)
         with element("div", "vf-alarm"):
-            chip(css, name)
+            chip(css, kind.words)
             ui.label(f"{one.state} until {one.until}" if one.until else one.state)
             if self._context.visitors.may_operate():
                 may, acknowledge = _possible(one.state), AlarmAction.ACKNOWLEDGE
-                ask = partial(self._ask, name, AlarmKind(one.kind), may)
+                ask = partial(self._ask, kind.words, kind, may)
                 if acknowledge in may:
-                    self._button("Acknowledge", name, partial(ask, acknowledge))
-                self._button("More …", name, ask)
+                    self._button("Acknowledge", kind.words, partial(ask, acknowledge))
+                self._button("More …", kind.words, ask)
             text("p", one.message, "vf-none")
 
     @staticmethod

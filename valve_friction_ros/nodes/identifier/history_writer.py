@@ -46,7 +46,7 @@ from valve_friction_ros.history.place import Claim
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.nodes.identifier.workers import HistoryThread
 from valve_friction_ros.nodes.plumbing.worker import InternalError, bugs_reported, done_in
-from valve_friction_ros.streams import utc_second
+from valve_friction_ros.streams import END_OF_TIME, utc_second
 
 if TYPE_CHECKING:
     from valve_friction_ros.history import HistoryFile, Sender
@@ -112,7 +112,6 @@ _HANDOVER = 10.0
 """Time, s, for which a node that is ending may still hold the history."""
 _LONGEST = 60.0
 """Time, s, after which an unfinished write is a problem; a locked file fails sooner."""
-_END_OF_TIME = 2**63 - 1
 
 _T = TypeVar("_T")
 
@@ -256,7 +255,7 @@ class HistoryWriter:
         """
         if self._file is None:
             return None
-        histories = database.valve_histories(self._file, (self.valve,), 0, _END_OF_TIME)
+        histories = database.valve_histories(self._file, (self.valve,), 0, END_OF_TIME)
         return histories[0] if histories else None
 
     def prepare(self) -> HistoryEntry | None:
