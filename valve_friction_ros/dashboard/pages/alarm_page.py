@@ -360,8 +360,8 @@ class _AlarmPage:
 class AlarmStates:
     """The alarms of one valve that are not normal, with buttons to answer them."""
 
-    def __init__(self, context: DashboardContext, node: str) -> None:
-        self._context, self._node = context, node
+    def __init__(self, context: DashboardContext, node: str, zone: ZoneInfo) -> None:
+        self._context, self._node, self._zone = context, node, zone
         self._alarms: tuple[ValveAlarm, ...] | None = None
 
     def draw(self) -> None:
@@ -395,7 +395,8 @@ class AlarmStates:
         kind = AlarmKind(one.kind)
         with element("div", "vf-alarm"):
             chip(css, kind.words)
-            ui.label(f"{one.state} until {one.until}" if one.until else one.state)
+            end = "" if one.until is None else f" until {moment(one.until, self._zone)[:16]}"
+            ui.label(one.state + end)
             if self._context.visitors.may_operate():
                 may, acknowledge = _possible(one.state), AlarmAction.ACKNOWLEDGE
                 ask = partial(self._ask, kind.words, kind, may)

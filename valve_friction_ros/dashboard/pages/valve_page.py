@@ -390,7 +390,7 @@ class _ValvePage:
             with card("Baselines") as self._baselines_body:
                 pass
             with card("Alarms"):
-                self._states = AlarmStates(self._context, self._node)
+                self._states = AlarmStates(self._context, self._node, self._page.zone)
                 self._states.draw()
             if self._context.is_live:
                 with card("Recordings of alarms") as self._alarms_body:
