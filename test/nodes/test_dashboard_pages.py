@@ -467,6 +467,13 @@ def test_an_alarm_of_a_valve_without_alarm_services_is_answered(plant, tab):
     assert (
         read_alarms(plant.history, node)[AlarmKind.FRICTION_HIGH].state is AlarmState.ACKNOWLEDGED
     )
+    row.get_by_role("link", name="CROWD-1").click()  # its identifier is not heard
+    card = page.get_by_role("region", name="Alarms")
+    card.locator(".vf-alarm", has_text="acknowledged").wait_for()
+    card.get_by_role("button", name="Take out of service").click()
+    page.get_by_label("Your name").fill("A. Operator")
+    page.get_by_role("button", name="Confirm").click()
+    card.locator(".vf-alarm", has_text="out of service until").first.wait_for()
 
 
 def test_what_cannot_be_called_says_so(tab):

@@ -24,7 +24,13 @@ from statistics import fmean, median
 from typing import TYPE_CHECKING, NamedTuple
 
 from valve_friction_ros import history as database
-from valve_friction_ros.dashboard.live_state import Plant, Status, Unread
+from valve_friction_ros.dashboard.live_state import (
+    Plant,
+    Status,
+    Unread,
+    ValveAlarm,
+    alarms_in,
+)
 from valve_friction_ros.health import (
     Alarm,
     AlarmError,
@@ -219,6 +225,15 @@ class HistoryCache:
         if self.file is None:
             return ()
         return database.alarm_events(self.file, chosen, most, is_standing=not is_journal)
+
+    def valve_alarms(self, node: str) -> tuple[ValveAlarm, ...] | None:
+        """Read the alarms of a valve that are not normal; None if no file holds the valve.
+
+        Raises HistoryError if the file cannot be read.
+        """
+        if self.file is None or not self.is_file or all(one.name != node for one in self.valves):
+            return None
+        return alarms_in(alarm_values(database.read_alarms(self.file, node)))
 
     @property
     def is_file(self) -> bool:

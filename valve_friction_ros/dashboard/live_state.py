@@ -402,14 +402,15 @@ def view_of(node: str, status: Status) -> ValveView:
         baseline=_baseline(values),
         drift=_drift(values),
         sources=Sources(*(values.get(key, "") for key in _SOURCES)),
-        alarms=_alarms(values),
+        alarms=alarms_in(values),
         lacks=_lacks(values),
         survey=_text(values, "survey", 20),
         values=values,
     )
 
 
-def _alarms(values: Mapping[str, str]) -> tuple[ValveAlarm, ...]:
+def alarms_in(values: Mapping[str, str]) -> tuple[ValveAlarm, ...]:
+    """Return the alarms that are not normal, from the values of a status."""
     return tuple(
         ValveAlarm(
             kind,

@@ -19,7 +19,7 @@ from zoneinfo import ZoneInfo
 from nicegui import run, ui
 
 from valve_friction_ros.dashboard.context import Answer, DashboardContext
-from valve_friction_ros.dashboard.live_state import ValveAlarm, ValveView
+from valve_friction_ros.dashboard.live_state import ValveAlarm
 from valve_friction_ros.dashboard.pages.theme import (
     AnswerLine,
     Frame,
@@ -377,12 +377,12 @@ class AlarmStates:
                         color=None,
                     ).props("no-caps unelevated dense").classes("vf-act")
 
-    def show(self, view: ValveView) -> None:
+    def show(self, alarms: tuple[ValveAlarm, ...]) -> None:
         """Show the present alarms."""
-        if view.alarms == self._alarms:
+        if alarms == self._alarms:
             return
-        self._alarms = view.alarms
-        redraw(self._body, lambda: self._draw_alarms(view.alarms))
+        self._alarms = alarms
+        redraw(self._body, lambda: self._draw_alarms(alarms))
 
     def _draw_alarms(self, alarms: Sequence[ValveAlarm]) -> None:
         if not alarms:
