@@ -21,8 +21,22 @@ from live_nodes import NAMESPACE, NODE, SECOND, START, buffered
 from local_server import free_port
 from records import quick_record
 
-from valve_friction_ros.health import AlarmKind, AlarmState, Condition, Level, StatusSignal
-from valve_friction_ros.history import HistoryFile, KeptValve, follow_alarms, read_alarms
+from valve_friction_ros.health import (
+    AlarmAction,
+    AlarmKind,
+    AlarmRequest,
+    AlarmState,
+    Condition,
+    Level,
+    StatusSignal,
+)
+from valve_friction_ros.history import (
+    HistoryFile,
+    KeptValve,
+    follow_alarms,
+    read_alarms,
+    request_many,
+)
 from valve_friction_ros.model import HIGH_FRICTION
 
 pytest.importorskip("nicegui", reason="NiceGUI is not installed")
@@ -517,3 +531,29 @@ def test_ctrl_c_ends_it_and_open_pages_heal_when_it_is_back(plant, tab):
     page.get_by_role("alert").get_by_text("No connection").wait_for(state="detached")
     wait_for_simulated_rows(page, 2)
     assert query_of(page) == {"show": "error", "sort": "tag"}
+
+
+def test_a_click_means_the_alarm_under_it_when_another_has_just_come(plant, tab):
+    """The server is ahead of the rows in the browser, which here get no news."""
+    shown = Condition(Level.ERROR, StatusSignal.FAILURE, "excess friction")
+    for number in (1, 2):
+        valve = KeptValve(f"/late/fv_{number}/identifier", f"LATE-{number}")
+        follow_alarms(plant.history, valve, {AlarmKind.STUCK: shown}, time.time_ns())
+        if number == 1:
+            page = tab.open("/alarms?area=/late")
+            row = page.locator("tr", has_text="LATE-1")
+            row.wait_for()
+            page.evaluate(
+                "getElement(Number(document.querySelector('.vf-alarms').id.slice(1))).update = "
+                "() => { window.hasNews = true }"
+            )
+    page.wait_for_function("window.hasNews")
+    row.get_by_role("button", name="Acknowledge").click()
+    page.locator(".vf-dialog-title").get_by_text("LATE-1, stuck").wait_for()
+    page.get_by_role("button", name="Cancel").click()
+    first = KeptValve("/late/fv_1/identifier", "LATE-1"), AlarmKind.STUCK
+    request_many(plant.history, [first], AlarmRequest(AlarmAction.ACKNOWLEDGE, "B"), time.time_ns())
+    page.evaluate("window.hasNews = false")
+    page.wait_for_function("window.hasNews")
+    row.get_by_role("button", name="Acknowledge").click()
+    page.get_by_text("LATE-1, stuck: acknowledged already").wait_for()

@@ -153,6 +153,7 @@ def _row(number: int, one: KeptAlarmEvent, zone: ZoneInfo, href: str, is_journal
     by = f"{event.action.value} by {event.who}" if event.who else event.action.value
     return {
         "i": number,
+        "alarm": [one.valve.name, alarm.kind.value],
         "href": href,
         "tag": printable(one.valve.tag, 80),
         "area": printable(one.area, 120),
@@ -334,17 +335,21 @@ class _AlarmPage:
 
     async def _ask(self, given: object) -> None:
         """Ask for an action on the alarm of a row."""
-        if not (isinstance(given, list) and len(given) == 2 and isinstance(given[0], int)):
+        if not (isinstance(given, list) and len(given) == 2):
             return
-        number, name = given
-        if not 0 <= number < len(self._events):
+        # By its name: the rows in the browser may be older than ours.
+        asked, name = given
+        some = (e for e in self._events if [e.valve.name, e.event.alarm.kind.value] == asked)
+        if (one := next(some, None)) is None:
             return
-        one = self._events[number]
         alarm = one.event.alarm
-        chosen = AlarmAction[name] if name in AlarmAction.__members__ else None
         title = f"{printable(one.valve.tag, 80)}, {alarm}"
-        answer = partial(self._context.answer_alarm, one.valve.name, alarm.kind)
         may, who = _possible(alarm.state.value), self._context.visitors.name()
+        chosen = next((action for action in may if action.name == name), None)
+        if name and chosen is None:
+            self._answer.tell(False, f"{title} already")
+            return
+        answer = partial(self._context.answer_alarm, one.valve.name, alarm.kind)
         await self._answer.ask(title, may, who, answer, chosen)
         self._shown = ()
 
