@@ -494,6 +494,12 @@ def test_an_alarm_of_a_valve_without_alarm_services_is_answered(plant, tab):
     page.get_by_label("Your name").fill("A. Operator")
     page.get_by_role("button", name="Confirm").click()
     card.locator(".vf-alarm", has_text="out of service until").first.wait_for()
+    card.get_by_role("button", name="More: friction high").click()
+    page.get_by_label("Comment", exact=True).fill("half a sen")
+    back = AlarmRequest(AlarmAction.PUT_BACK, "B")
+    request_many(plant.history, [(valve, AlarmKind.STUCK)], back, time.time_ns())
+    card.locator(".vf-alarm", has_text="stuck").wait_for(state="detached")
+    assert page.get_by_label("Comment", exact=True).input_value() == "half a sen"
 
 
 def test_what_cannot_be_called_says_so(tab):

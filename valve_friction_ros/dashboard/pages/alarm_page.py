@@ -11,6 +11,7 @@
 
 import time
 from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -217,7 +218,10 @@ class _RequestLine(AnswerLine):
             action.on_value_change(show)
             show()
 
-        if not await agreed(title, title, draw, ("Cancel", "Confirm"), "flat no-caps"):
+        # Beside this line: what was clicked may be redrawn, and would take the dialog with it.
+        with self.parent_slot or nullcontext():
+            is_agreed = await agreed(title, title, draw, ("Cancel", "Confirm"), "flat no-caps")
+        if not is_agreed:
             return
         action, who, words, hours = (one.value for one in made)
         done, duration = AlarmAction[str(action)], 3600 * float(hours or 0.0)
@@ -358,7 +362,8 @@ class _AlarmPage:
         alarms = [(one.valve, one.event.alarm.kind) for one in some]
         only, who = (AlarmAction.ACKNOWLEDGE,), self._context.visitors.name()
         answer = partial(self._context.answer_alarms, alarms)
-        await self._answer.ask(f"Acknowledge {len(some)} alarms", only, who, answer)
+        title = f"Acknowledge {len(some)} alarm{'s' * (len(some) != 1)}"
+        await self._answer.ask(title, only, who, answer)
         self._shown = ()
 
 
