@@ -19,6 +19,7 @@ import math
 import re
 import threading
 import time
+from collections.abc import Iterable
 from typing import Any
 
 import rclpy
@@ -52,6 +53,7 @@ class Valve:
         self._di, self._own = spaces
         self._nodes: dict[str, UaNode] = {}
         self._served: dict[str, ua.DataValue] = {}
+        self._shown: set[str] = set()
         self._alarm: dict[str, UaNode] = {}
         self._states: dict[str, str] = {}
 
@@ -70,6 +72,7 @@ class Valve:
 
     async def _put(self, name: str, place: UaNode, given: ua.DataValue, **more: Any) -> None:
         """Write a variable if it has changed."""
+        self._shown.add(name)
         space, data_type = more.get("space", self._own), more.get("data_type")
         if name not in self._nodes:
             bare, value = name.rsplit("/", 1)[-1], given.Value
@@ -85,7 +88,8 @@ class Valve:
             await self._server.write_attribute_value(self._nodes[name].nodeid, given)
 
     async def show(self, status: DiagnosticStatus) -> None:
-        """Show a status of ``/diagnostics``."""
+        """Show a status of ``/diagnostics``; a value that it no longer holds is unknown."""
+        self._shown.clear()
         values = {entry.key: entry.value for entry in status.values}
         health = _value(SIGNALS.index(values.get("NE 107", "")), ua.VariantType.Int32)
         enumeration = ua.NodeId(ENUMERATION, self._di)
@@ -101,6 +105,7 @@ class Valve:
                 await self._put(name, self._root, given, unit=unit)
         for found in filter(None, map(ALARM.fullmatch, values)):
             await self._show_alarm(found[1], values)
+        await self._mark(self._nodes.keys() - self._shown, ua.StatusCodes.BadNoData)
 
     async def _show_alarm(self, kind: str, values: dict[str, str]) -> None:
         if kind not in self._alarm:
@@ -132,12 +137,12 @@ class Valve:
 
     async def fall_silent(self) -> None:
         """Mark all values as the last usable values."""
-        for name, node in self._nodes.items():
-            last = self._served[name]
-            if last.StatusCode.value != SILENT:
-                kept = _value(last.Value.Value, last.Value.VariantType, SILENT)
-                self._served[name] = kept
-                await self._server.write_attribute_value(node.nodeid, kept)
+        await self._mark(self._nodes.keys(), SILENT)
+
+    async def _mark(self, names: Iterable[str], code: int) -> None:
+        for name in names:
+            last = self._served[name].Value
+            await self._put(name, self._root, _value(last.Value, last.VariantType, code))
 
 
 def _value(value: Any, kind: ua.VariantType, code: int = GOOD) -> ua.DataValue:

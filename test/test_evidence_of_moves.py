@@ -11,6 +11,7 @@
 
 import math
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -253,6 +254,19 @@ def test_a_turn_without_a_rest_makes_two_moves():
     assert [one.direction for one in found] == [1, -1]
     for move in found:
         assert friction_of(move) == pytest.approx(FRICTION, rel=0.01)
+
+
+def test_no_part_of_a_long_motion_is_taken_for_one_of_another_time():
+    """A slow swing of the stem without a rest, cut after ten seconds."""
+    time = np.arange(0, 180, 0.02)
+    position = 0.014 + 0.01 * np.sin(2 * np.pi * time / 60)
+    way = np.sign(np.gradient(position))
+    pressure = (SPRING * position + PRELOAD + way * FRICTION) / VALVE.diaphragm_area
+    stamps = START + np.round(time * 1e9).astype(np.int64)
+    found = taken_by(100, arrivals(stamps, pressure + VALVE.pressure_reference, position))
+    assert len(found) >= 15
+    for before, after in pairwise(found):
+        assert stamp_problem(after, before.end, int(stamps[-1])) == ""
 
 
 @pytest.mark.parametrize(

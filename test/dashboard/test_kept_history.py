@@ -17,19 +17,30 @@ from contextlib import closing
 from zoneinfo import ZoneInfo
 
 import pytest
-from histories import DAY, OTHER, START, VALVE, refused, success
+from histories import DAY, OTHER, SECOND, START, VALVE, refused, success
 
 from valve_friction_ros.dashboard.charts import trend_chart
-from valve_friction_ros.dashboard.history_cache import HistoryCache
-from valve_friction_ros.dashboard.live_state import Quantity, ValveView
+from valve_friction_ros.dashboard.history_cache import HistoryCache, KeptValves
+from valve_friction_ros.dashboard.live_state import Plant, Quantity, ValveView
 from valve_friction_ros.dashboard.plant_rows import compared, side_of_entry, side_of_view
-from valve_friction_ros.health import Baseline
+from valve_friction_ros.health import (
+    AlarmAction,
+    AlarmKind,
+    AlarmRequest,
+    Baseline,
+    Condition,
+    Level,
+    StatusSignal,
+)
 from valve_friction_ros.history import (
     HistoryFile,
     KeptBaseline,
+    alarm_events,
     copied,
+    follow_alarms,
     history_mark,
     keep_usage,
+    request_alarms,
 )
 from valve_friction_ros.history.copying import PARTS, rows_of, write_rows
 from valve_friction_ros.history.database import reading, writing
@@ -182,6 +193,23 @@ def test_without_a_file_nothing_is_kept():
     assert not kept.refresh()
     assert kept.valve(VALVE.name) is None
     assert "no history_file" in kept.problem
+
+
+def test_without_an_identifier_an_alarm_comes_back_when_its_shelving_ends(file, monkeypatch):
+    high = AlarmKind.FRICTION_HIGH
+    shown = Condition(Level.WARN, StatusSignal.MAINTENANCE_REQUIRED, "friction has grown")
+    follow_alarms(file, VALVE, {high: shown}, NOW)
+    request_alarms(file, VALVE, high, AlarmRequest(AlarmAction.SHELVE, "A", "", 60.0), NOW)
+    plant = Plant(math.inf)
+    kept = KeptValves(file.path, plant)
+    for later, state in ((59, "shelved"), (60, "unacknowledged"), (99, "unacknowledged")):
+        monkeypatch.setattr("time.time_ns", lambda later=later: NOW + later * SECOND)
+        kept.refresh()
+        kept.refresh()
+        (heard,) = plant.valves(1e9)
+        assert [one.state for one in heard.view.alarms] == [state]
+    (newest, *_) = alarm_events(file)
+    assert (newest.event.action, newest.event.time) == (AlarmAction.EXPIRE, NOW + 60 * SECOND)
 
 
 def test_it_is_read_while_another_process_writes(file):

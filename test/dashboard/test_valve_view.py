@@ -55,6 +55,13 @@ def test_the_time_of_the_estimate_is_utc():
     assert shown.identified == 1_772_600_767_250_000_000
 
 
+def test_a_shelved_alarm_ends_at_a_time_that_each_zone_can_write():
+    shelved = {"alarm stuck": "shelved", "alarm stuck level": "ERROR"}
+    (alarm,) = view(**shelved, **{"alarm stuck until [time]": "2026-03-04T05:06:07Z"}).alarms
+    assert alarm.until == 1_772_600_767_000_000_000
+    assert not alarm.is_told
+
+
 def test_changes_since_the_baseline_are_rounded_to_their_intervals():
     shown = view(
         **{

@@ -53,7 +53,7 @@ from valve_friction_ros.history.tables import put
 HIGH, DATA = AlarmKind.FRICTION_HIGH, AlarmKind.DATA_QUALITY
 WARN = Condition(Level.WARN, StatusSignal.MAINTENANCE_REQUIRED, "friction has grown")
 FAULT = Condition(Level.WARN, StatusSignal.CHECK_FUNCTION, "no sample of the stem")
-ACKNOWLEDGED = AlarmRequest(AlarmAction.ACKNOWLEDGE, "A. Operator", "seen")
+ACKNOWLEDGED = AlarmRequest(AlarmAction.ACKNOWLEDGE, "A. Operator", "seen with MÜLLER")
 
 
 @pytest.fixture
@@ -227,6 +227,7 @@ def test_ten_thousand_events_are_listed_and_filtered(history):
         (AlarmFilter(words="operator seen"), 1),
         (AlarmFilter(words="100%"), 0),
         (AlarmFilter(words="lv-7"), 1),
+        (AlarmFilter(words="müller"), 1),
     ],
 )
 def test_a_filter_keeps_what_it_says(history, chosen, count):

@@ -21,8 +21,22 @@ from live_nodes import NAMESPACE, NODE, SECOND, START, buffered
 from local_server import free_port
 from records import quick_record
 
-from valve_friction_ros.health import AlarmKind, AlarmState, Condition, Level, StatusSignal
-from valve_friction_ros.history import HistoryFile, KeptValve, follow_alarms, read_alarms
+from valve_friction_ros.health import (
+    AlarmAction,
+    AlarmKind,
+    AlarmRequest,
+    AlarmState,
+    Condition,
+    Level,
+    StatusSignal,
+)
+from valve_friction_ros.history import (
+    HistoryFile,
+    KeptValve,
+    follow_alarms,
+    read_alarms,
+    request_many,
+)
 from valve_friction_ros.model import HIGH_FRICTION
 
 pytest.importorskip("nicegui", reason="NiceGUI is not installed")
@@ -270,6 +284,12 @@ def test_a_drag_over_the_trend_chooses_its_time(tab):
     page.mouse.move(box["x"] + 0.6 * box["width"], middle, steps=5)
     page.mouse.up()
     page.wait_for_function(f"{shown} < 100")
+    # The only point is years old; an hour is the one before now.
+    end = f'{TREND}.chart.getModel().getComponent("xAxis").axis.scale.getExtent()[1]'
+    page.get_by_role("button", name="1 h", exact=True).click()
+    page.wait_for_function(f"Math.abs({end} - Date.now()) < 60000 && {shown} === 100")
+    page.get_by_role("button", name="all", exact=True).click()
+    page.wait_for_function(f"{end} < Date.now() - 3e10")
 
 
 def test_keys_of_experts_are_folded_away_and_opened_by_the_keyboard(tab):
@@ -467,6 +487,19 @@ def test_an_alarm_of_a_valve_without_alarm_services_is_answered(plant, tab):
     assert (
         read_alarms(plant.history, node)[AlarmKind.FRICTION_HIGH].state is AlarmState.ACKNOWLEDGED
     )
+    row.get_by_role("link", name="CROWD-1").click()  # its identifier is not heard
+    card = page.get_by_role("region", name="Alarms")
+    card.locator(".vf-alarm", has_text="acknowledged").wait_for()
+    card.get_by_role("button", name="Take out of service").click()
+    page.get_by_label("Your name").fill("A. Operator")
+    page.get_by_role("button", name="Confirm").click()
+    card.locator(".vf-alarm", has_text="out of service until").first.wait_for()
+    card.get_by_role("button", name="More: friction high").click()
+    page.get_by_label("Comment", exact=True).fill("half a sen")
+    back = AlarmRequest(AlarmAction.PUT_BACK, "B")
+    request_many(plant.history, [(valve, AlarmKind.STUCK)], back, time.time_ns())
+    card.locator(".vf-alarm", has_text="stuck").wait_for(state="detached")
+    assert page.get_by_label("Comment", exact=True).input_value() == "half a sen"
 
 
 def test_what_cannot_be_called_says_so(tab):
@@ -504,3 +537,29 @@ def test_ctrl_c_ends_it_and_open_pages_heal_when_it_is_back(plant, tab):
     page.get_by_role("alert").get_by_text("No connection").wait_for(state="detached")
     wait_for_simulated_rows(page, 2)
     assert query_of(page) == {"show": "error", "sort": "tag"}
+
+
+def test_a_click_means_the_alarm_under_it_when_another_has_just_come(plant, tab):
+    """The server is ahead of the rows in the browser, which here get no news."""
+    shown = Condition(Level.ERROR, StatusSignal.FAILURE, "excess friction")
+    for number in (1, 2):
+        valve = KeptValve(f"/late/fv_{number}/identifier", f"LATE-{number}")
+        follow_alarms(plant.history, valve, {AlarmKind.STUCK: shown}, time.time_ns())
+        if number == 1:
+            page = tab.open("/alarms?area=/late")
+            row = page.locator("tr", has_text="LATE-1")
+            row.wait_for()
+            page.evaluate(
+                "getElement(Number(document.querySelector('.vf-alarms').id.slice(1))).update = "
+                "() => { window.hasNews = true }"
+            )
+    page.wait_for_function("window.hasNews")
+    row.get_by_role("button", name="Acknowledge").click()
+    page.locator(".vf-dialog-title").get_by_text("LATE-1, stuck").wait_for()
+    page.get_by_role("button", name="Cancel").click()
+    first = KeptValve("/late/fv_1/identifier", "LATE-1"), AlarmKind.STUCK
+    request_many(plant.history, [first], AlarmRequest(AlarmAction.ACKNOWLEDGE, "B"), time.time_ns())
+    page.evaluate("window.hasNews = false")
+    page.wait_for_function("window.hasNews")
+    row.get_by_role("button", name="Acknowledge").click()
+    page.get_by_text("LATE-1, stuck: acknowledged already").wait_for()

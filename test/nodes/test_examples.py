@@ -479,6 +479,12 @@ def test_each_signal_of_ne_107_and_each_verdict(live, served):
     kind = served.do(served.node("V-F", f"{served.di}:DeviceHealth").read_data_type())
     assert (kind.NamespaceIndex, kind.Identifier) == (served.di, 6244)
 
+    del numbers["identified"]  # such as a ratio without a baseline
+    live.client.wait_until(
+        lambda: heard() and served.read("V-F", f"{served.own}:identified_one")[1] == "BadNoData",
+        "that it is not known any more",
+    )
+
 
 def test_the_small_dashboard_shows_a_valve_and_what_becomes_of_it(live):
     live.start_identifier({"valve_tag": "FV-101"})

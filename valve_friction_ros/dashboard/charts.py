@@ -226,12 +226,17 @@ DRAG_TO_ZOOM: Options = {
 """Action that makes a drag over the chart select a time range."""
 
 
-def zoom(now: int, span: int | None, zone: ZoneInfo) -> Options:
-    """Return the action that zooms to a time span before now, ns; None for all."""
-    if span is None:
-        return {"type": "dataZoom", "start": 0, "end": 100}
-    begin, end = _wall(now - span, zone), _wall(now, zone)
-    return {"type": "dataZoom", "startValue": begin, "endValue": end}
+def zoomed(now: int, span: int | None, zone: ZoneInfo) -> Options:
+    """Return the options that show a time span before now, ns; None for all.
+
+    The axis ends now: a zoom would move to the newest point, and look as recent.
+    """
+    begin, end = (None, None) if span is None else (_wall(now - span, zone), _wall(now, zone))
+    return {"xAxis": {"min": begin, "max": end}}
+
+
+WHOLE_AXIS: Options = {"type": "dataZoom", "start": 0, "end": 100}
+"""Action that ends a zoom."""
 
 
 _EVENTS = {

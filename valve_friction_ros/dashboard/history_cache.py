@@ -12,6 +12,7 @@
 Where no identifier is heard, it also supplies a plant with its valves.
 """
 
+import contextlib
 import json
 import math
 import threading
@@ -23,9 +24,16 @@ from statistics import fmean, median
 from typing import TYPE_CHECKING, NamedTuple
 
 from valve_friction_ros import history as database
-from valve_friction_ros.dashboard.live_state import Plant, Status, Unread
+from valve_friction_ros.dashboard.live_state import (
+    Plant,
+    Status,
+    Unread,
+    ValveAlarm,
+    alarms_in,
+)
 from valve_friction_ros.health import (
     Alarm,
+    AlarmError,
     AlarmKind,
     Level,
     StatusSignal,
@@ -218,6 +226,15 @@ class HistoryCache:
             return ()
         return database.alarm_events(self.file, chosen, most, is_standing=not is_journal)
 
+    def valve_alarms(self, node: str) -> tuple[ValveAlarm, ...] | None:
+        """Read the alarms of a valve that are not normal; None if no file holds the valve.
+
+        Raises HistoryError if the file cannot be read.
+        """
+        if self.file is None or not self.is_file or all(one.name != node for one in self.valves):
+            return None
+        return alarms_in(alarm_values(database.read_alarms(self.file, node)))
+
     @property
     def is_file(self) -> bool:
         """Whether the history is a file, which identifiers on this machine follow."""
@@ -299,8 +316,11 @@ class KeptValves(HistoryCache):
         self._told = (-1, -1)
         self._read: HistoryMark | None = None
         self._statuses: dict[KeptValve, list[Status]] = {}
+        self._ends: dict[KeptValve, int] = {}
+        """Earliest end of shelving or absence of each valve, ns."""
 
     def _refresh(self) -> bool:
+        self._end_suppressions()
         is_new = super()._refresh()
         state = (self.revision, self.alarm_revision)
         if state != self._told and self.problem is None:
@@ -310,6 +330,13 @@ class KeptValves(HistoryCache):
             except HistoryError as error:
                 self.problem, self._told = str(error), (-1, -1)
         return is_new
+
+    def _end_suppressions(self) -> None:
+        """Write what the clock does to alarms, which an identifier would do."""
+        now = time.time_ns()
+        for valve in [one for one, end in self._ends.copy().items() if end <= now]:
+            with contextlib.suppress(AlarmError, HistoryError):  # not ours to write
+                database.follow_alarms(self._history, valve, {}, now)
 
     def _tell(self) -> None:
         """Pass on the statuses of all valves; an alarm event alone rereads no histories."""
@@ -325,6 +352,8 @@ class KeptValves(HistoryCache):
                     found = database.valve_histories(self._history, (valve,), 0, END_OF_TIME)
                     self._statuses[valve] = [_status_of(one) for one in found]
                 alarms = database.read_alarms(self._history, valve.name)
+                ends = (one.until for one in alarms.values() if one.until is not None)
+                self._ends[valve] = min(ends, default=END_OF_TIME)
                 statuses = [_with_alarms(one, alarms) for one in self._statuses[valve]]
             except (ValueError, TypeError, KeyError) as error:
                 signal = {"NE 107": StatusSignal.CHECK_FUNCTION.value}

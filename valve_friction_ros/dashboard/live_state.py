@@ -214,20 +214,20 @@ class ValveAlarm(NamedTuple):
         Level of its condition: ``OK``, ``WARN`` or ``ERROR``.
     message : str
         Sentence on its condition.
-    until : str
-        End of shelving or of the time out of service; empty if neither applies.
+    until : int or None
+        End of shelving or of the time out of service, ns since 1970; None if neither applies.
     """
 
     kind: str
     state: str
     level: str = "OK"
     message: str = ""
-    until: str = ""
+    until: int | None = None
 
     @property
     def is_told(self) -> bool:
         """Whether the alarm is active and not suppressed."""
-        return self.level != "OK" and not self.until
+        return self.level != "OK" and self.until is None
 
     @property
     def advice(self) -> str:
@@ -402,21 +402,22 @@ def view_of(node: str, status: Status) -> ValveView:
         baseline=_baseline(values),
         drift=_drift(values),
         sources=Sources(*(values.get(key, "") for key in _SOURCES)),
-        alarms=_alarms(values),
+        alarms=alarms_in(values),
         lacks=_lacks(values),
         survey=_text(values, "survey", 20),
         values=values,
     )
 
 
-def _alarms(values: Mapping[str, str]) -> tuple[ValveAlarm, ...]:
+def alarms_in(values: Mapping[str, str]) -> tuple[ValveAlarm, ...]:
+    """Return the alarms that are not normal, from the values of a status."""
     return tuple(
         ValveAlarm(
             kind,
             _text(values, name, 40),
             _text(values, f"{name} level", 10),
             _text(values, f"{name} message", _LONGEST_SENTENCE),
-            _text(values, f"{name} until [time]", 40),
+            _stamp(values.get(f"{name} until [time]", "")),
         )
         for kind, name in zip(ALARM_KINDS, _ALARMS, strict=True)
         if values.get(name, _NORMAL) != _NORMAL
@@ -442,8 +443,9 @@ def _lacks(values: Mapping[str, str]) -> tuple[BaselineLack, ...]:
 
 
 def _stamp(text: str) -> int | None:
+    fraction = ".%f" if "." in text else ""
     try:
-        moment = datetime.strptime(text, "%Y-%m-%dT%H:%M:%S.%f%z")
+        moment = datetime.strptime(text, f"%Y-%m-%dT%H:%M:%S{fraction}%z")
     except ValueError:
         return None
     return round(moment.timestamp() * 1e3) * 1_000_000

@@ -399,9 +399,10 @@ def _change(split: Split, origin: int, lag: float) -> FrictionChange:
 def _too_few(moves: Moves, has_changed: bool) -> str:
     up, down = (int(np.sum(moves.direction == way)) for way in (1, -1))
     blocks = len(set(blocks_of(moves, MOST_BLOCKS).tolist()))
+    some = f"{blocks} block{'s' * (blocks != 1)} of time"
     since = " since friction changed" if has_changed else ""
     return (
-        f"{up} moves up and {down} down in {blocks} blocks of time{since}: {FEWEST_MOVES} of each "
+        f"{up} moves up and {down} down in {some}{since}: {FEWEST_MOVES} of each "
         f"in {FEWEST_BLOCKS} blocks are needed; leave the valve in service"
     )
 

@@ -169,7 +169,8 @@ def stamp_problem(move: Move, last: int | None, now: int) -> str:
     now : int
         The node's clock, ns since 1970 (UTC).
     """
-    if last is not None and move.begin < last:
+    # The parts of a motion that is cut overlap by a sample.
+    if last is not None and move.end <= last:
         return "earlier than those stored"
     if now > _CLOCK_IS_SET and move.end > max(now, last or 0) + DAY:
         return "more than a day ahead of the clock and of those stored"

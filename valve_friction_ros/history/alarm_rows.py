@@ -44,7 +44,7 @@ from valve_friction_ros.health.levels import Level, StatusSignal
 from valve_friction_ros.history import tables
 from valve_friction_ros.history.database import reading, writing
 from valve_friction_ros.history.entry import KeptValve
-from valve_friction_ros.history.history import History, HistoryFile
+from valve_friction_ros.history.history import History
 from valve_friction_ros.history.place import file_state
 from valve_friction_ros.history.rows import oldest_kept, valve_id
 from valve_friction_ros.history.tables import joined, put
@@ -167,7 +167,7 @@ def _kept(
 
 
 def follow_alarms(
-    file: HistoryFile,
+    history: History,
     valve: KeptValve,
     conditions: Mapping[AlarmKind, Condition],
     time: int,
@@ -177,7 +177,7 @@ def follow_alarms(
 
     Events more than `days` older are deleted (0: none), except the last event of each alarm.
     """
-    return _kept(file, valve, days, lambda alarms: all_followed(alarms, conditions, time))
+    return _kept(history, valve, days, lambda alarms: all_followed(alarms, conditions, time))
 
 
 def request_alarms(

@@ -127,6 +127,8 @@ _uri: ContextVar[str] = ContextVar("uri")
 def _opened() -> sqlite3.Connection:
     connection = sqlite3.connect(_uri.get(), uri=True, timeout=_PATIENCE, isolation_level=None)
     connection.execute("PRAGMA foreign_keys = ON")
+    # Its own lower() knows only the letters A to Z.
+    connection.create_function("lower", 1, str.lower, deterministic=True)
     return connection
 
 

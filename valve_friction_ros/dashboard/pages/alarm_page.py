@@ -11,6 +11,7 @@
 
 import time
 from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -19,7 +20,7 @@ from zoneinfo import ZoneInfo
 from nicegui import run, ui
 
 from valve_friction_ros.dashboard.context import Answer, DashboardContext
-from valve_friction_ros.dashboard.live_state import ValveAlarm, ValveView
+from valve_friction_ros.dashboard.live_state import ValveAlarm
 from valve_friction_ros.dashboard.pages.theme import (
     AnswerLine,
     Frame,
@@ -153,6 +154,7 @@ def _row(number: int, one: KeptAlarmEvent, zone: ZoneInfo, href: str, is_journal
     by = f"{event.action.value} by {event.who}" if event.who else event.action.value
     return {
         "i": number,
+        "alarm": [one.valve.name, alarm.kind.value],
         "href": href,
         "tag": printable(one.valve.tag, 80),
         "area": printable(one.area, 120),
@@ -216,7 +218,10 @@ class _RequestLine(AnswerLine):
             action.on_value_change(show)
             show()
 
-        if not await agreed(title, title, draw, ("Cancel", "Confirm"), "flat no-caps"):
+        # Beside this line: what was clicked may be redrawn, and would take the dialog with it.
+        with self.parent_slot or nullcontext():
+            is_agreed = await agreed(title, title, draw, ("Cancel", "Confirm"), "flat no-caps")
+        if not is_agreed:
             return
         action, who, words, hours = (one.value for one in made)
         done, duration = AlarmAction[str(action)], 3600 * float(hours or 0.0)
@@ -334,17 +339,21 @@ class _AlarmPage:
 
     async def _ask(self, given: object) -> None:
         """Ask for an action on the alarm of a row."""
-        if not (isinstance(given, list) and len(given) == 2 and isinstance(given[0], int)):
+        if not (isinstance(given, list) and len(given) == 2):
             return
-        number, name = given
-        if not 0 <= number < len(self._events):
+        # By its name: the rows in the browser may be older than ours.
+        asked, name = given
+        some = (e for e in self._events if [e.valve.name, e.event.alarm.kind.value] == asked)
+        if (one := next(some, None)) is None:
             return
-        one = self._events[number]
         alarm = one.event.alarm
-        chosen = AlarmAction[name] if name in AlarmAction.__members__ else None
         title = f"{printable(one.valve.tag, 80)}, {alarm}"
-        answer = partial(self._context.answer_alarm, one.valve.name, alarm.kind)
         may, who = _possible(alarm.state.value), self._context.visitors.name()
+        chosen = next((action for action in may if action.name == name), None)
+        if name and chosen is None:
+            self._answer.tell(False, f"{title} already")
+            return
+        answer = partial(self._context.answer_alarm, one.valve.name, alarm.kind)
         await self._answer.ask(title, may, who, answer, chosen)
         self._shown = ()
 
@@ -353,15 +362,16 @@ class _AlarmPage:
         alarms = [(one.valve, one.event.alarm.kind) for one in some]
         only, who = (AlarmAction.ACKNOWLEDGE,), self._context.visitors.name()
         answer = partial(self._context.answer_alarms, alarms)
-        await self._answer.ask(f"Acknowledge {len(some)} alarms", only, who, answer)
+        title = f"Acknowledge {len(some)} alarm{'s' * (len(some) != 1)}"
+        await self._answer.ask(title, only, who, answer)
         self._shown = ()
 
 
 class AlarmStates:
     """The alarms of one valve that are not normal, with buttons to answer them."""
 
-    def __init__(self, context: DashboardContext, node: str) -> None:
-        self._context, self._node = context, node
+    def __init__(self, context: DashboardContext, node: str, zone: ZoneInfo) -> None:
+        self._context, self._node, self._zone = context, node, zone
         self._alarms: tuple[ValveAlarm, ...] | None = None
 
     def draw(self) -> None:
@@ -377,12 +387,12 @@ class AlarmStates:
                         color=None,
                     ).props("no-caps unelevated dense").classes("vf-act")
 
-    def show(self, view: ValveView) -> None:
+    def show(self, alarms: tuple[ValveAlarm, ...]) -> None:
         """Show the present alarms."""
-        if view.alarms == self._alarms:
+        if alarms == self._alarms:
             return
-        self._alarms = view.alarms
-        redraw(self._body, lambda: self._draw_alarms(view.alarms))
+        self._alarms = alarms
+        redraw(self._body, lambda: self._draw_alarms(alarms))
 
     def _draw_alarms(self, alarms: Sequence[ValveAlarm]) -> None:
         if not alarms:
@@ -395,7 +405,8 @@ class AlarmStates:
         kind = AlarmKind(one.kind)
         with element("div", "vf-alarm"):
             chip(css, kind.words)
-            ui.label(f"{one.state} until {one.until}" if one.until else one.state)
+            end = "" if one.until is None else f" until {moment(one.until, self._zone)[:16]}"
+            ui.label(one.state + end)
             if self._context.visitors.may_operate():
                 may, acknowledge = _possible(one.state), AlarmAction.ACKNOWLEDGE
                 ask = partial(self._ask, kind.words, kind, may)

@@ -24,9 +24,9 @@ export default {
           <td v-if="!journal && may" class="vf-row-acts">
             <button v-if="row.can.includes('ACKNOWLEDGE')" type="button" class="vf-filter"
               :aria-label="'Acknowledge ' + row.kind + ' of ' + row.tag"
-              @click="$emit('ask', [row.i, 'ACKNOWLEDGE'])">Acknowledge</button>
+              @click="$emit('ask', [row.alarm, 'ACKNOWLEDGE'])">Acknowledge</button>
             <button type="button" class="vf-filter" :aria-label="'More for ' + row.kind + ' of ' + row.tag"
-              @click="$emit('ask', [row.i, ''])">More …</button></td>
+              @click="$emit('ask', [row.alarm, ''])">More …</button></td>
         </tr>
       </tbody>
     </table>

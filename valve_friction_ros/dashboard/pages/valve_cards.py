@@ -21,12 +21,13 @@ from nicegui import ui
 
 from valve_friction_ros.dashboard.charts import (
     DRAG_TO_ZOOM,
+    WHOLE_AXIS,
     live_chart,
     live_data,
     loop_chart,
     loop_data,
     trend_chart,
-    zoom,
+    zoomed,
 )
 from valve_friction_ros.dashboard.context import OfferedFile
 from valve_friction_ros.dashboard.live_state import Quantity, ValveView
@@ -151,7 +152,8 @@ def draw_trend(
             button.on("click", lambda span=span: show(span))
 
     def show(span: int | None) -> None:
-        chart.run_chart_method("dispatchAction", zoom(time.time_ns(), span, zone))
+        chart.run_chart_method("setOption", zoomed(time.time_ns(), span, zone))
+        chart.run_chart_method("dispatchAction", WHOLE_AXIS)
 
     drawn = trend_chart(kept, zone, time.time_ns(), events)
     chart = _chart(drawn, "vf-chart-trend", "Friction over time")

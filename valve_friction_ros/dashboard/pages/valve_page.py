@@ -22,7 +22,7 @@ from valve_friction_ros.dashboard.context import (
     OfferedFile,
     ValveFiles,
 )
-from valve_friction_ros.dashboard.live_state import Heard, Quantity, ValveView
+from valve_friction_ros.dashboard.live_state import Heard, Quantity, ValveAlarm, ValveView
 from valve_friction_ros.dashboard.live_strip import LiveStrip
 from valve_friction_ros.dashboard.pages.alarm_page import AlarmStates
 from valve_friction_ros.dashboard.pages.theme import (
@@ -345,6 +345,7 @@ class _ValvePage:
         self._revision = -1
         self._beat = 0
         self._history: ValveHistory | None = None
+        self._kept_alarms: tuple[ValveAlarm, ...] | None = None
         self._head = _ValveHead(page, context.is_live)
         signals = context.signals
         self._signals = ValveSignals(LiveStrip(60.0) if signals is None else signals.watch(node))
@@ -390,7 +391,7 @@ class _ValvePage:
             with card("Baselines") as self._baselines_body:
                 pass
             with card("Alarms"):
-                self._states = AlarmStates(self._context, self._node)
+                self._states = AlarmStates(self._context, self._node, self._page.zone)
                 self._states.draw()
             if self._context.is_live:
                 with card("Recordings of alarms") as self._alarms_body:
@@ -431,7 +432,8 @@ class _ValvePage:
             self._state = state
             self._head.show(view, heard, state)
             self._show_values(view)
-            self._states.show(view)
+        kept, is_silent = self._kept_alarms, heard is None or heard.is_silent
+        self._states.show(view.alarms if kept is None or not is_silent else kept)
         self._head.show_facts(view, heard)
 
     def _show_values(self, view: ValveView) -> None:
@@ -449,6 +451,7 @@ class _ValvePage:
         self._revision = self._context.history.revision
         try:
             self._history = await run.io_bound(self._context.history.valve, self._node)
+            self._kept_alarms = await run.io_bound(self._context.history.valve_alarms, self._node)
             problem = self._context.history.problem
         except HistoryError as error:
             problem = str(error)

@@ -86,9 +86,8 @@ class InputWatch:
         else:
             cause = "its publisher is silent"
             if not self._has_arrived and silence < _LEASE:
-                cause += (
-                    f", or it is still waiting for a node that was killed (up to {_LEASE:g} s: wait"
-                )
+                lease = f"up to {_LEASE:g} s"
+                cause += f", or it is still waiting for a node that was killed ({lease}): wait"
         return f"no data on {self.topic} for {silence:.1f} s: {cause}"
 
 
