@@ -484,7 +484,6 @@ def pairs(unchanged):
     ]
 
 
-@pytest.mark.slow
 def test_an_unchanged_valve_raises_none_and_no_interval_would_hide_a_change_of_5_percent(pairs):
     found = [diagnose(now, BENCH_VALVE, baseline) for now, baseline in pairs]
     assert [one.level for one in found] == [Level.OK] * len(SEEDS)
