@@ -26,6 +26,8 @@ export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
 ifndef ROS_DISTRO
 export RMW_IMPLEMENTATION := rmw_fastrtps_cpp
 endif
+# Each of the hundreds of processes that tests start would compile the package anew.
+unexport PYTHONDONTWRITEBYTECODE
 # Another environment with ROS 2 wheels, if activated, would hand down its own library path.
 ifdef _ROS_WHEELS_BOOTSTRAP_COMPLETE
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
