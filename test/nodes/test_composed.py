@@ -232,6 +232,19 @@ def test_life_cycle(live, compose):
         assert state(client) == State.PRIMARY_STATE_FINALIZED
 
 
+@pytest.mark.parametrize("kind", [TurnExecutor, SingleThreadedExecutor])
+def test_a_transition_that_the_state_does_not_have_is_refused(live, compose, kind):
+    """It was never answered, and ended the executor of a user."""
+    client, node = live.client, compose(lifecycle=True)
+    with spun(node, kind(context=compose.context)):
+        for illegal in (Transition.TRANSITION_CLEANUP, Transition.TRANSITION_ACTIVATE, 200):
+            assert not change(client, illegal)
+        assert change(client, Transition.TRANSITION_CONFIGURE)
+        assert not change(client, Transition.TRANSITION_CONFIGURE)
+        assert state(client) == State.PRIMARY_STATE_INACTIVE
+    assert not node.failures
+
+
 def test_a_wrong_parameter_leaves_the_node_unconfigured(live, compose):
     client = live.client
     with spun(compose(lifecycle=True, warn_ratio=3.0), TurnExecutor(context=compose.context)):
