@@ -269,6 +269,21 @@ def test_no_part_of_a_long_motion_is_taken_for_one_of_another_time():
         assert stamp_problem(after, before.end, int(stamps[-1])) == ""
 
 
+@pytest.mark.parametrize("period", [0.004, 0.1])
+def test_the_parts_of_a_slow_stroke_follow_each_other(period):
+    """A minute up and a minute down are cut, and no part overlaps the one before it."""
+    time = np.arange(0, 120, period)
+    position = 2e-3 + 0.02 * np.abs((time / 60) % 2 - 1)
+    way = np.sign(np.gradient(position))
+    pressure = (SPRING * position + PRELOAD + way * FRICTION) / VALVE.diaphragm_area
+    stamps = START + np.round(time * 1e9).astype(np.int64)
+    found = taken_by(50, arrivals(stamps, pressure + VALVE.pressure_reference, position))
+    assert found[-1].end > START + 105e9
+    pauses = [then.begin - one.end for one, then in pairwise(found)]
+    assert min(pauses) >= 0, pauses
+    assert max(pauses) <= 0.5e9, pauses
+
+
 @pytest.mark.parametrize(
     ("changes", "words"),
     [

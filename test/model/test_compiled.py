@@ -108,3 +108,24 @@ def test_nowhere_to_cache(kernels):
     nowhere = {"HOME": "/dev/null", "XDG_CACHE_HOME": "/dev/null"}
     assert run(kernels, **nowhere) == (1, False)
     assert run(kernels, **nowhere) == (1, False)
+
+
+def test_another_thread_may_load_scipy_meanwhile(tmp_path):
+    """As that of a node in the process of a user: its import must not fail."""
+    code = """
+import importlib, threading
+from valve_friction_ros.model import compiled
+
+def load_numba(_):
+    try:
+        import scipy.linalg.cython_blas
+    except ImportError:
+        print("hidden")
+    other = threading.Thread(target=lambda: print(importlib.import_module("scipy.linalg").norm(4)))
+    other.start()
+    other.join()
+
+compiled.import_module = load_numba
+compiled._without_scipy()
+"""
+    assert told(tmp_path, "-c", code).split() == ["hidden", "4.0"]

@@ -11,6 +11,7 @@
 
 import contextlib
 import importlib.metadata
+import re
 import threading
 import urllib.error
 import urllib.request
@@ -27,12 +28,14 @@ from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
 from rclpy.experimental import EventsExecutor
 from rclpy.parameter import Parameter
 from records import quick_record
+from std_msgs.msg import Empty
 from type_description_interfaces.srv import GetTypeDescription
 
 from valve_friction_ros.model import BENCH_VALVE
+from valve_friction_ros.nodes import Dashboard, PressureSource, Simulator, StrokePlayer
 from valve_friction_ros.nodes.identifier.node import Identifier
 from valve_friction_ros.nodes.plumbing import polled_node, polled_subscription, rclpy_private
-from valve_friction_ros.nodes.plumbing.polled_node import TurnExecutor
+from valve_friction_ros.nodes.plumbing.polled_node import PacedNode, TurnExecutor
 
 EXECUTORS = {
     "single": SingleThreadedExecutor,
@@ -146,6 +149,49 @@ def test_the_version_of_rclpy_has_been_tried():
     )
 
 
+@pytest.mark.parametrize(
+    ("kind", "wrong", "words"),
+    [
+        (PressureSource, {"excitation": "noise"}, "excitation 'noise' is unknown"),
+        (PressureSource, {"time_jitter": 1.0}, "must be below half of the sampling period"),
+        (Simulator, {"static_friction": 1.0}, "must not be below coulomb_friction"),
+        (StrokePlayer, {}, "the parameter file is empty: give the file of `plan-test --output`"),
+        (Dashboard, {"accounts_file": "/nowhere/accounts"}, "/nowhere/accounts"),
+    ],
+)
+def test_a_refused_node_leaves_the_graph(compose, kind, wrong, words):
+    """A user's process may go on without it; nobody must find services that never answer."""
+    watcher = rclpy.create_node("watcher", context=compose.context)
+    changes = [Parameter(name, value=value) for name, value in wrong.items()]
+    with pytest.raises((ValueError, OSError), match=re.escape(words)) as refused:
+        kind(context=compose.context, parameter_overrides=changes)
+    assert set(watcher.get_node_names()) <= {"watcher", "tester"}, refused
+    watcher.destroy_node()
+
+
+def test_a_step_that_outlasts_the_end_is_no_bug(compose, monkeypatch, capfd):
+    """As of the first sample, while its libraries are loaded on a busy machine."""
+    monkeypatch.setattr(polled_node, "_STEP_PATIENCE", 0.01)
+    begun, destroyed = threading.Event(), threading.Event()
+
+    class Slow(PacedNode):
+        def step(self):
+            begun.set()
+            destroyed.wait(60)
+            self.alive.publish(Empty())
+            return 0.0
+
+    node = Slow("slow", context=compose.context)
+    node.alive = node.create_publisher(Empty, "alive", 1)
+    node.poll_guarded()
+    assert begun.wait(60)
+    node.destroy_node()
+    destroyed.set()
+    node._thread.join(60)
+    assert not node.failures
+    assert "internal error" not in capfd.readouterr().err
+
+
 def change(client, transition, node=NODE):
     request = ChangeState.Request(transition=Transition(id=transition))
     return client.call(ChangeState, f"{node}/change_state", request).success
@@ -184,6 +230,19 @@ def test_life_cycle(live, compose):
             client.disconnect()
         assert change(client, Transition.TRANSITION_UNCONFIGURED_SHUTDOWN)
         assert state(client) == State.PRIMARY_STATE_FINALIZED
+
+
+@pytest.mark.parametrize("kind", [TurnExecutor, SingleThreadedExecutor])
+def test_a_transition_that_the_state_does_not_have_is_refused(live, compose, kind):
+    """It was never answered, and ended the executor of a user."""
+    client, node = live.client, compose(lifecycle=True)
+    with spun(node, kind(context=compose.context)):
+        for illegal in (Transition.TRANSITION_CLEANUP, Transition.TRANSITION_ACTIVATE, 200):
+            assert not change(client, illegal)
+        assert change(client, Transition.TRANSITION_CONFIGURE)
+        assert not change(client, Transition.TRANSITION_CONFIGURE)
+        assert state(client) == State.PRIMARY_STATE_INACTIVE
+    assert not node.failures
 
 
 def test_a_wrong_parameter_leaves_the_node_unconfigured(live, compose):

@@ -10,6 +10,7 @@
 """Streams that are polled, and the executor that runs what is ready, over real DDS."""
 
 import time
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,16 +19,18 @@ import waiting
 from live_nodes import SECOND, Client, Domain, time_of
 from rclpy.duration import Duration
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.experimental import EventsExecutor
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import FluidPressure, JointState
 from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 from waiting import PATIENCE
 
-from valve_friction_ros.nodes.identifier.valve_inputs import ValveInputs
+from valve_friction_ros.nodes.identifier.valve_inputs import ValveInputs, _Input
 from valve_friction_ros.nodes.plumbing.polled_node import PolledNode, TurnExecutor, create_service
 from valve_friction_ros.nodes.plumbing.polled_subscription import PolledSubscription
 from valve_friction_ros.nodes.plumbing.qos import blocks, stream
+from valve_friction_ros.streams import Losses
 
 
 @pytest.fixture
@@ -81,12 +84,42 @@ def test_messages_are_taken_in_their_order(bench, raw):
     assert begin - SECOND < received[0] <= received[-1] < time.time_ns() + SECOND
 
 
+@pytest.mark.parametrize(("lost", "share"), [(10017, "100 %"), (20, "0.2 %")])
+def test_the_share_of_lost_messages_is_read_as_a_number(lost, share):
+    losses = Losses(lost=lost, recently_lost=lost, recently_taken=10045 - lost, silence=0.0)
+    told = _Input.loss_problem(SimpleNamespace(losses=losses, topic="numbers"))
+    assert told.startswith(f"{share} of the messages on numbers were lost in the last minute")
+
+
 def send_all(publisher, messages):
     """Publish in bursts that no queue of the transport is overrun by."""
     for begin in range(0, len(messages), 200):
         for message in messages[begin : begin + 200]:
             publisher.publish(message)
         assert publisher.wait_for_all_acked(Duration(seconds=PATIENCE)), "not acknowledged"
+
+
+def test_where_the_executor_takes_all_messages_nothing_else_takes_them(bench):
+    """The EventsExecutor heeds no callback groups: of two takers none would know the order."""
+    node, executor, client = bench
+    executor.remove_node(node)
+    events = EventsExecutor(context=node.context)
+    events.add_node(node)
+    polled = PolledSubscription(node, Float64, "numbers", blocks())
+    publisher = client.node.create_publisher(Float64, "numbers", blocks())
+    wait_until(publisher.get_subscription_count, "the subscription")
+    send_all(publisher, [Float64(data=float(number)) for number in range(500)])
+    messages = polled.take()
+    assert messages == []
+
+    def all_came():
+        events.spin_once(0.01)
+        messages.extend(polled.take())
+        return len(messages) >= 500
+
+    wait_until(all_came, "the messages")
+    events.shutdown()
+    assert [one.message.data for one in messages] == list(range(500))
 
 
 def test_a_flood_is_taken_by_turns(bench):

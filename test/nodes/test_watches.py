@@ -66,8 +66,7 @@ def node_of(values, now=lambda: START, log=None, is_played=False):
         (
             5.0,
             False,
-            "its publisher is silent, or it is still waiting for a node that was killed "
-            "(up to 20 s): wait",
+            "its publisher is silent, or it is still waiting for a node that was killed: wait up",
         ),
         (25.0, False, "its publisher is silent"),
         (5.0, True, "its publisher is silent"),

@@ -169,8 +169,7 @@ def stamp_problem(move: Move, last: int | None, now: int) -> str:
     now : int
         The node's clock, ns since 1970 (UTC).
     """
-    # The parts of a motion that is cut overlap by a sample.
-    if last is not None and move.end <= last:
+    if last is not None and move.begin < last:
         return "earlier than those stored"
     if now > _CLOCK_IS_SET and move.end > max(now, last or 0) + DAY:
         return "more than a day ahead of the clock and of those stored"
@@ -214,6 +213,9 @@ _LEAST_DISTANCE = 3.0
 _LONGEST_MOTION = 10.0
 """Time, s, after which a motion without a rest is cut. The kinetic energy of so slow a stem is
 negligible: at 10 mm/s, 1 kg has 5·10⁻⁵ J, and 100 N over 1 mm are 0.1 J."""
+
+_MARGIN = 2
+"""Samples before and after a motion that belong to its moves, unless to the motion before."""
 
 _GAP_PERIODS = 10
 _STOPS = 0.01
@@ -269,18 +271,18 @@ def _moves_in(
     runs = _motions(both, band)
     end = both.time.size - 1
     settled = both.time[-1] - 2 * REST
-    done = -math.inf
+    done = 0
     found: list[Move] = []
     for first, final in runs:
         last = final
         if both.time[last] > both.time[-1] - 3 * REST:  # perhaps not at rest yet
             if both.time[end] - both.time[first] < _LONGEST_MOTION:
-                settled = min(settled, max(both.time[first] - 2 * REST, done))
+                settled = min(settled, both.time[first] - 2 * REST)
                 break
             last, settled = end, both.time[end]
-        done = both.time[last]
-        found += _moves_of(both, first, last, valve, band)
-    return tuple(found), both.origin + round(settled * 1e9)
+        begin, done = max(first - _MARGIN, done), min(last + _MARGIN, end)
+        found += _moves_of(both, begin, done, first, valve, band)
+    return tuple(found), both.origin + round(max(settled, both.time[done]) * 1e9)
 
 
 def _signals(pressure: Samples, position: Samples, valve: Valve, newest: int) -> _Signals:
@@ -328,14 +330,15 @@ def _motions(both: _Signals, band: float) -> list[tuple[int, int]]:
     return [(int(first), int(last) - 1) for first, last in edges.reshape(-1, 2)]
 
 
-def _moves_of(both: _Signals, first: int, last: int, valve: Valve, band: float) -> list[Move]:
-    """Return the moves of one motion, cut where it reverses and where it lasts too long.
+def _moves_of(
+    both: _Signals, begin: int, end: int, first: int, valve: Valve, band: float
+) -> list[Move]:
+    """Return the moves from begin to end, cut where they reverse and where they last too long.
 
-    A motion with a gap yields no move: if a clock was set, the gap may span years.
+    The motion is detected from sample `first` on. A motion with a gap yields no
+    move: if a clock was set, the gap may span years.
     """
     found: list[Move] = []
-    margin = 2
-    begin, end = max(first - margin, 0), min(last + margin, both.time.size - 1)
     if both.is_broken(both.time[begin], both.time[end]):
         return found
     for low, high in _one_way(both.position, begin, end, band):
@@ -570,7 +573,8 @@ class MoveStream:
         moves, settled = _moves_in(pressure, position, self._valve, self._band)
         for kind in _SIGNALS:
             kept = self._kept[kind]
-            first = max(int(np.searchsorted(kept.stamps, settled)) - 1, 0)
+            # From the end of a motion that was cut: an earlier sample would make its rest overlap.
+            first = max(int(np.searchsorted(kept.stamps, settled, side="right")) - 1, 0)
             self._kept[kind] = Samples(kept.stamps[first:], kept.values[first:])
         return moves
 

@@ -28,6 +28,7 @@ import threading
 from collections.abc import Callable
 from functools import cache, update_wrapper
 from importlib import import_module
+from importlib.abc import MetaPathFinder
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar, cast
 
@@ -129,6 +130,18 @@ def _forgive_a_full_disk(kernel: Any) -> None:
         kernel._cache.save_overload = save_if_possible  # noqa: SLF001
 
 
+class _MissingHere(MetaPathFinder):
+    """Hides a package that is not yet loaded from the thread that makes this, and from no other."""
+
+    def __init__(self, package: str) -> None:
+        self._package, self._thread = package, threading.get_ident()
+
+    def find_spec(self, name: str, *_: object) -> None:
+        """Refuse the package."""
+        if name == self._package and threading.get_ident() == self._thread:
+            raise ModuleNotFoundError(f"{name} is not needed here", name=name)
+
+
 def _load_alone(kernel: Any) -> None:
     """Load machine code from the cache without all that numba needs for compilation.
 
@@ -155,14 +168,12 @@ def _without_scipy() -> None:
 
     Numba asks for scipy's BLAS, and does without if it is missing. No kernel multiplies matrices.
     """
-    name = "scipy.linalg.cython_blas"
-    if name in sys.modules:
-        return
-    sys.modules[name] = None  # type: ignore[assignment]
+    missing = _MissingHere("scipy.linalg")
+    sys.meta_path = [missing, *sys.meta_path]  # a new list: others may be searching the old one
     try:
         import_module("numba.np.arraymath")
     finally:
-        del sys.modules[name]
+        sys.meta_path = [one for one in sys.meta_path if one is not missing]
 
 
 def kernels_are_cached() -> bool:

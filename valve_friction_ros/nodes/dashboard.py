@@ -368,8 +368,9 @@ class Dashboard(ManagedNode):
 
     def __init__(self, **named: Any) -> None:
         super().__init__("dashboard", **named)
-        declare_parameters(self, NODES["dashboard"])
-        self.options = _options(values_of(self, NODES["dashboard"]))
+        with self.removed_if_refused():
+            declare_parameters(self, NODES["dashboard"])
+            self.options = _options(values_of(self, NODES["dashboard"]))
         self.plant = Plant(self.options.silence)
         self.calls = ServiceCalls()
         self.signals = WatchedSignals(self._sources_of)

@@ -93,6 +93,17 @@ def _excitation(values: Mapping[str, Any]) -> Excitation:
     return waves[kind](low, high, period)
 
 
+def _period(values: Mapping[str, Any]) -> float:
+    """Return the sampling period, s; raises ValueError if the jitter exceeds its half."""
+    period, jitter = 1.0 / values["sample_rate"], values["time_jitter"]
+    if not jitter < period / 2:
+        raise ValueError(
+            f"time_jitter ({jitter:g} s) must be below half of the sampling period "
+            f"({period:g} s): time stamps would not increase"
+        )
+    return period
+
+
 class PressureSource(PacedNode):
     """Publishes the signal, each sample at its time and with its own stamp.
 
@@ -106,19 +117,15 @@ class PressureSource(PacedNode):
 
     def __init__(self, **named: Any) -> None:
         super().__init__("pressure_source", **named)
-        declare_parameters(self, _PARAMETERS)
-        values = values_of(self, _PARAMETERS)
-        self._excitation = _excitation(values)
-        self._period = 1.0 / values["sample_rate"]
+        with self.removed_if_refused():
+            declare_parameters(self, _PARAMETERS)
+            values = values_of(self, _PARAMETERS)
+            self._excitation = _excitation(values)
+            self._period = _period(values)
         self._speed = values["speed"]
         self._lag = values["converter_lag"]
         self._noise = values["pressure_noise"]
         self._jitter = values["time_jitter"]
-        if not self._jitter < self._period / 2:
-            raise ValueError(
-                f"time_jitter ({self._jitter:g} s) must be below half of the sampling period "
-                f"({self._period:g} s): time stamps would not increase"
-            )
         self._tick = max(self._period / self._speed, _TICK)
         self._most = _CATCHING_UP * math.ceil(self._tick * self._speed / self._period)
         self._random = np.random.default_rng(values["noise_seed"])

@@ -83,8 +83,9 @@ class Simulator(PacedNode):
 
     def __init__(self, **named: Any) -> None:
         super().__init__("simulator", **named)
-        declare_parameters(self, _PARAMETERS)
-        self._plant = _plant(values_of(self, _CHANGEABLE))
+        with self.removed_if_refused():
+            declare_parameters(self, _PARAMETERS)
+            self._plant = _plant(values_of(self, _CHANGEABLE))
         reject_invalid(self, _CHANGEABLE, _plant)
         self.add_post_set_parameters_callback(self._take_parameters)
         self._joint = self.get_parameter("joint").value or "stem"

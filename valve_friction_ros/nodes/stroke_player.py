@@ -41,6 +41,8 @@ _ACKNOWLEDGED = Duration(seconds=1.0)
 
 def _played(values: Mapping[str, Any]) -> PlayedTest:
     """Read the test and its limits; raises ValueError if a limit is missing or violated."""
+    if not values["file"]:
+        raise ValueError("the parameter file is empty: give the file of `plan-test --output`")
     signal = pressure_from_file(Path(values["file"]).expanduser(), values)
     margin = values["pressure_margin"]
     limits = PlayLimits(
@@ -65,9 +67,10 @@ class StrokePlayer(PacedNode):
 
     def __init__(self, **named: Any) -> None:
         super().__init__("stroke_player", **named)
-        declare_parameters(self, _PARAMETERS)
-        values = values_of(self, _PARAMETERS)
-        self._test = _played(values)
+        with self.removed_if_refused():
+            declare_parameters(self, _PARAMETERS)
+            values = values_of(self, _PARAMETERS)
+            self._test = _played(values)
         self._period, self._joint = 1.0 / values["sample_rate"], values["joint"]
         self._told: tuple[PlayPhase, str] | None = None
         self._lock = threading.Lock()  # services and steps run in different threads

@@ -193,16 +193,13 @@ class Identifier(ManagedNode):
         **named: Any,
     ) -> None:
         super().__init__("identifier", namespace=namespace, **named)
-        try:
+        with self.removed_if_refused():
             declare_parameters(self, NODES["identifier"])
-            reject_invalid(self, CHANGEABLE, _require_valid)
-            self.add_post_set_parameters_callback(self._take_parameters)
-            self._shared_workers = workers
-            self._status_name = f"{self.get_fully_qualified_name()}: friction"
-            self._tag = self.get_parameter("valve_tag").value or self.get_namespace().strip("/")
-        except BaseException:
-            super().destroy_node()
-            raise
+        reject_invalid(self, CHANGEABLE, _require_valid)
+        self.add_post_set_parameters_callback(self._take_parameters)
+        self._shared_workers = workers
+        self._status_name = f"{self.get_fully_qualified_name()}: friction"
+        self._tag = self.get_parameter("valve_tag").value or self.get_namespace().strip("/")
         self.begin()
 
     def configure(self) -> None:

@@ -22,6 +22,7 @@ from valve_friction_ros.nodes.plumbing.polled_subscription import PolledSubscrip
 from valve_friction_ros.nodes.plumbing.qos import blocks, stream
 from valve_friction_ros.records.bags.topics import StreamNames
 from valve_friction_ros.streams import Arrivals, Signal
+from valve_friction_ros.wording import percentage
 
 _SILENCE = 0.5
 """Time without messages, s, after which the quality of service is suspected."""
@@ -60,7 +61,7 @@ class _Input(PolledSubscription):
             return None
         published = losses.recently_lost + losses.recently_taken
         return (
-            f"{100 * losses.share:.2g} % of the messages on {self.topic} were lost in the "
+            f"{percentage(losses.share)} of the messages on {self.topic} were lost in the "
             f"last minute ({losses.recently_lost} of {published}): they arrive faster than this "
             "process can take them, or the network drops them; publish fewer messages, or blocks "
             "on ~/samples"

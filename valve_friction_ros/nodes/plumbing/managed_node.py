@@ -55,6 +55,9 @@ class ManagedNode(LifecycleNodeMixin, PolledNode):
         """
         if self.get_parameter("lifecycle").value:
             LifecycleNodeMixin.__init__(self, callback_group=self._services_in_turns)
+            for service in self.services:
+                if service.srv_name.endswith("/change_state"):
+                    service.callback = self._refusing(service.callback)
             self.get_logger().info("unconfigured: waiting for its first life-cycle transition")
             return
         try:
@@ -63,6 +66,17 @@ class ManagedNode(LifecycleNodeMixin, PolledNode):
             self.destroy_node()
             raise
         self.is_active = True
+
+    def _refusing(self, change: Callable[..., Any]) -> Callable[..., Any]:
+        """Refuse a transition that the state does not have; rclpy would end the executor."""
+
+        def answered(request: Any, response: Any) -> Any:
+            with contextlib.suppress(RuntimeError):  # RCLError, which is not public
+                return change(request, response)
+            response.success = False
+            return response
+
+        return self.exclusive(answered)
 
     def configure(self) -> None:
         """Create all entities and resources of the node; raises ValueError for wrong parameters."""

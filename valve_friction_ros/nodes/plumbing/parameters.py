@@ -92,7 +92,7 @@ def _wrong_type(settings: Iterable[Setting], changes: Iterable[Parameter]) -> st
     unset = {one.name for one in settings if one.default is None}
     for one in changes:
         if one.name in unset and one.type_ not in (Parameter.Type.NOT_SET, Parameter.Type.DOUBLE):
-            return f"{one.name}: expected '{Parameter.Type.DOUBLE}' got '{one.type_}'"
+            return f"{one.name}: expected 'Type.DOUBLE' got 'Type.{one.type_.name}'"
     return ""
 
 

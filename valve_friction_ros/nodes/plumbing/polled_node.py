@@ -27,6 +27,7 @@ from rcl_interfaces.msg import SetParametersResult
 from rclpy.callback_groups import CallbackGroup
 from rclpy.clock import Clock, ClockType
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
+from rclpy.exceptions import InvalidHandle
 from rclpy.executors import (
     ConditionReachedException,
     Executor,
@@ -147,6 +148,15 @@ class PolledNode(Node):
             overrides = named.get("parameter_overrides") or ()
             named["parameter_overrides"] = [*overrides, _NO_TYPE_DESCRIPTIONS]
         super().__init__(*arguments, start_parameter_services=start_parameter_services, **named)
+
+    @contextlib.contextmanager
+    def removed_if_refused(self) -> Iterator[None]:
+        """Remove the node from the graph if its construction fails, as for a wrong parameter."""
+        try:
+            yield
+        except BaseException:
+            super().destroy_node()
+            raise
 
     @property
     def executor(self) -> Executor | None:
@@ -337,7 +347,11 @@ class PacedNode(PolledNode):
         while not self._has_ended:
             following = time.monotonic() + _STEP_PATIENCE
             with self.guarded("step"):
-                following = self.step()
+                try:
+                    following = self.step()
+                except InvalidHandle:
+                    if not self._has_ended:  # else the node was destroyed during a long step
+                        raise
             # Waiting for an event costs twice as much.
             if (pause := following - time.monotonic()) > 0:
                 time.sleep(pause)

@@ -30,7 +30,11 @@ from rclpy.subscription import Subscription
 
 from valve_friction_ros.nodes.plumbing.polled_node import NeverReady, PolledNode
 from valve_friction_ros.nodes.plumbing.qos import qos_overrides
-from valve_friction_ros.nodes.plumbing.rclpy_private import take_messages, takes_directly
+from valve_friction_ros.nodes.plumbing.rclpy_private import (
+    heeds_groups,
+    take_messages,
+    takes_directly,
+)
 from valve_friction_ros.streams import LossCounter, Losses
 
 _MOST = 3_000
@@ -86,8 +90,9 @@ class InputWatch:
         else:
             cause = "its publisher is silent"
             if not self._has_arrived and silence < _LEASE:
-                lease = f"up to {_LEASE:g} s"
-                cause += f", or it is still waiting for a node that was killed ({lease}): wait"
+                cause += (
+                    f", or it is still waiting for a node that was killed: wait up to {_LEASE:g} s"
+                )
         return f"no data on {self.topic} for {silence:.1f} s: {cause}"
 
 
@@ -208,7 +213,8 @@ class PolledSubscription(InputWatch):
         found: list[tuple[Any, dict[str, Any]]] = []
         while self._handed_over and len(found) < most:
             found.append(self._handed_over.popleft())
-        if takes_directly(self._subscription):
+        # Where the executor takes them too, the order would be lost.
+        if takes_directly(self._subscription) and heeds_groups(self._node.executor):
             found += take_messages(self._subscription, most - len(found))
         taken = [TakenMessage(message, details["received_timestamp"]) for message, details in found]
         numbers = [details.get("publication_sequence_number") for _, details in found]

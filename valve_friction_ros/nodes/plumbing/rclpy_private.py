@@ -63,8 +63,12 @@ def awaits_coroutines(executor: Executor | None) -> bool:
     The experimental EventsExecutor of Jazzy sends the coroutine itself as the response. That of
     Kilted, whose executors create futures, awaits it.
     """
-    is_of_events = type(executor).__name__ == "EventsExecutor"
-    return not is_of_events or hasattr(Executor, "create_future")
+    return heeds_groups(executor) or hasattr(Executor, "create_future")
+
+
+def heeds_groups(executor: Executor | None) -> bool:
+    """Return whether an executor heeds callback groups, as all do but the EventsExecutor."""
+    return type(executor).__name__ != "EventsExecutor"
 
 
 def parameter_overrides(node: Node) -> dict[str, Parameter]:
