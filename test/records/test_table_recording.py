@@ -661,6 +661,12 @@ class TestWrittenDates:
         book.save(tmp_path / "record.xlsx")
         assert read_csv(tmp_path / "record.xlsx").start_time == noon.timestamp()
 
+    def test_a_column_of_milliseconds_beside_the_date(self, write):
+        stamps = [f"15.07.2026 12:00:{int(one):02d}" for one in AXIS]
+        rest = [f"{round(1e3 * one) % 1000}" for one in AXIS]
+        found = read_csv(write(lines("Time,ms,Air [bar],Stem [%]", stamps, rest, BARS, SHARES)))
+        assert found.time == pytest.approx(AXIS)
+
 
 class TestQualities:
     def test_a_code_that_was_the_same_at_first(self, write):
@@ -704,3 +710,25 @@ def test_range_and_travel_are_asked_for_together(write):
     message = refused(path, Valve(0.0445))
     assert "(--pressure-range '0..2.5 bar'" in message
     assert "name the travel in the valve file" in message
+
+
+def test_units_below_merged_cells(write):
+    """The headers look like those of TwinCAT Scope, which are alike in every other column."""
+    stamps = [f"2026-07-15 12:00:0{one}" for one in TENTHS]
+    rows = lines("FV-1;;FV-1;", stamps, BARS, stamps, SHARES, mark=";")
+    rows[1:1] = ["Time;Actual;Time;Actual", ";bar;;%"]
+    form = Columns(position_column="FV-1 Actual (2)")
+    assert read_csv(write(rows), form=form).pressure == pytest.approx(PRESSURE, abs=51)
+
+
+def test_tags_with_their_folder(write):
+    """A table of Ignition with tags of several valves; no header has the word for the values."""
+    rows = []
+    for time, bar, share in zip(TENTHS, BARS, SHARES, strict=True):
+        for valve in ("FV-1", "FV-2"):
+            rows.append(f"2026-07-15 12:00:0{time},[default]Plant/{valve}/PT,{bar},bar")
+            rows.append(f"2026-07-15 12:00:0{time},[default]Plant/{valve}/ZT,{share},%")
+    path = write(["t_stamp,tagpath,floatvalue,units", *rows])
+    found = read_recordings(path, BENCH_VALVE)
+    assert [one.name for one in found] == ["Plant/FV-1", "Plant/FV-2"]
+    assert found[1].recording().pressure == pytest.approx(PRESSURE, abs=51)

@@ -30,8 +30,8 @@ _WORDS = {
     "stellsignal stellgröße mv",
     "quality": "quality status qstatus confidence güte qualität qualitätscode qualitaet valid "
     "questionable annotated good stat q",
-    "tag": "tag tagname tagid variablenname logname signalname parameter name point pointname "
-    "signal series variable messstelle kanal sensor metric "
+    "tag": "tag tagname tagid tagpath variablenname logname signalname parameter name point "
+    "pointname signal series variable messstelle kanal sensor metric "
     "item id kks channel tags field varname",
     "value": "value wert val messwert vtq y varvalue",
     "unit": "unit units einheit eu uom engunits",
@@ -105,6 +105,9 @@ def _unit_and_rest(text: str) -> tuple[str, str]:
     return "", text
 
 
+_PROVIDER = re.compile(r"^\[\w+\](?=[\w -]+/)")
+"""Provider before the path of a tag of Ignition."""
+
 _PRESSURE_MESSAGE = re.compile(r"/.*[/.]fluid_pressure")
 _JOINT_MESSAGE = re.compile(r"/.*/position(?:[/.\[]\w+\]?)?|/.*state.*[/.]position")
 
@@ -118,6 +121,7 @@ def _of_message(name: str) -> str:
 
 def named(texts: Sequence[str], unit_cell: str = "") -> Named:
     """Interpret the header of a column from all rows of the header and its row of units."""
+    texts = [_PROVIDER.sub("", text) for text in texts]
     unit, rest = _of_message(texts[0]), []
     for text in texts:
         own, without = _unit_and_rest(text.strip())

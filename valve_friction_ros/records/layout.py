@@ -156,6 +156,7 @@ class Layout:
     def _time_words(self, form: TimeForm) -> str:
         if form.unit:
             since = str(np.datetime64(form.origin // 10**9, "s")).removesuffix("T00:00:00")
+            since = "the year 0" if since.startswith("-") else since
             zone = form.zone or "UTC"
             return f"time in {form.unit}" + (f" since {since} {zone}" if form.origin else "")
         if not form.formats:
@@ -307,18 +308,21 @@ class Look:
         entries above its values. The start of the export is given in 100 ns since 1601.
         """
         found: dict[str, list[str]] = {}
-        for place, (line, row) in enumerate(self.rows):
+        places: list[int] = []
+        for place, (_, row) in enumerate(self.rows):
             begin = re.fullmatch(r"Start.*;(\d{18})", ";".join(row[:2]))
             if begin and not found:
                 self.origin = (int(begin[1]) - _FILE_TIME) * 100
             cells = row[: len(row) // 2 * 2]
             if len(cells) > 2 and len({*cells[::2]}) == 1 and re.match(r"[A-Za-z]", cells[0]):
                 found[cells[0]] = cells[1::2]
-                self.rows[place] = (line, [])
-                self._top = place + 1
+                places.append(place)
         if "Name" not in found:
-            self.origin = self._top = 0
+            self.origin = 0
             return []
+        for place in places:
+            self.rows[place] = (self.rows[place][0], [])
+        self._top = places[-1] + 1
         units = [unit.split(" (")[0] for unit in found.get("Unit", [""] * len(found["Name"]))]
         return [
             [one for name in found["Name"] for one in ("time", name)],

@@ -102,15 +102,10 @@ class _Recognition(Look):
             column = self.by_name(self.form.time_column, "--time-column")
             return [(column.place,)] if column else []
         dates: list[tuple[int, ...]] = [(column.place,) for column in self.of_kind("date")]
-        fine = [place for place in dates if not self._repeats(place[0])]
-        if dates and (fine or not self._numeric_times()):
-            return fine or dates
-        for day, clock in pairwise(self.columns):
-            if (day.kind, clock.kind) == ("day", "clock"):
-                beside = self.columns[clock.place + 1 : clock.place + 2]
-                rest = (one.place for one in beside if _MILLISECONDS.fullmatch(one.name))
-                return [(day.place, clock.place, *rest)]
         numeric = self._numeric_times()
+        fine = [place for place in dates if not self._repeats(place[0])] or self._split_times()
+        if fine or (dates and not numeric):
+            return fine or dates
         if clocks := self.of_kind("clock") or ([] if numeric else self._written()):
             return [(clocks[0].place,)]
         if len(numeric) == 1 or (numeric and self._are_pairs(numeric)):
@@ -118,6 +113,18 @@ class _Recognition(Look):
         possible = [one for one in self.of_kind("number", "") if not one.said.unit]
         self._ask_name("time", [one.name for one in numeric or possible])
         self.questions[-1] += ", and its unit (--time-unit)"
+        return []
+
+    def _split_times(self) -> list[tuple[int, ...]]:
+        """Return adjacent columns that together are a time: of days, times of day, milliseconds."""
+        for day, clock in pairwise(self.columns):
+            is_rest = all(one.isdigit() and len(one) <= len("999") for one in clock.filled)
+            if day.kind == "date" and is_rest and _MILLISECONDS.fullmatch(clock.name):
+                return [(day.place, clock.place)]
+            if (day.kind, clock.kind) == ("day", "clock"):
+                beside = self.columns[clock.place + 1 : clock.place + 2]
+                rest = (one.place for one in beside if _MILLISECONDS.fullmatch(one.name))
+                return [(day.place, clock.place, *rest)]
         return []
 
     def _written(self) -> list[SeenColumn]:
@@ -256,13 +263,16 @@ class _Recognition(Look):
         if self.form.value_column:
             column = self.by_name(self.form.value_column, "--value-column")
             return column.place if column else -1
-        numeric = [one for one in self.of_kind("number") if one.place not in times]
-        numeric = [one for one in numeric if one.said.quantity != "quality"]
+        numeric = self._values(times)
         found = [one for one in numeric if one.said.quantity == "value"] or numeric
         if len(found) == 1:
             return found[0].place
         self._ask_name("value", [one.name for one in found])
         return -1
+
+    def _values(self, times: set[int]) -> list[SeenColumn]:
+        numeric = [one for one in self.of_kind("number") if one.place not in times]
+        return [one for one in numeric if one.said.quantity != "quality"]
 
     def _find_tags(self, times: set[int]) -> None:
         """Find the tags if each row has one value."""
@@ -270,7 +280,7 @@ class _Recognition(Look):
         if self.form.tag_column:
             column = self.by_name(self.form.tag_column, "--tag-column")
             texts = [column] if column else []
-        elif not self.of_kind("number", "value"):
+        elif not self.of_kind("number", "value") and len(self._values(times)) != 1:
             return
         if len(texts) > 1:
             self._ask_name("tag", [one.name for one in texts])
@@ -301,7 +311,8 @@ class _Recognition(Look):
         listed = " or ".join(shlex.quote(name) for name in among[:_MOST_CHOICES])
         more = " …" if len(among) > _MOST_CHOICES else ""
         listed = f" {listed}{more}" if among else ""
-        what = "column" if self.tag_place is None else "tag"
+        is_tag = self.tag_place is not None and quantity not in ("tag", "value")
+        what = "tag" if is_tag else "column"
         what = f"which {what} is the {quantity}" + ("" if among else f", of {self.names}")
         self.questions.append(f"{what} (--{quantity}-column{listed})")
 
@@ -443,10 +454,12 @@ class _Recognition(Look):
 
     def _opposing(self) -> Iterator[TableSignal]:
         name = self.form.opposing_pressure_column
+        if not name:
+            return
         found = [each for each in self._candidates(set()) if each[0] == name]
-        if name and found:
+        if found:
             yield self._signal("pressure", *found[0])
-        elif name:
+        else:
             self.by_name(name, "--opposing-pressure-column")
 
     def _chosen(self, quantity: str, candidates: Sequence[_Candidate]) -> list[_Candidate]:
@@ -501,7 +514,10 @@ class _Recognition(Look):
     ) -> None:
         said = " ".join([*self.questions, *self.lacking])
         texts = [
-            one.name for one in self.of_kind("text") if 1 < len({*one.filled}) <= _MOST_SIGNALS
+            one.name
+            for one in self.of_kind("text")
+            if 1 < len({*one.filled}) <= _MOST_SIGNALS
+            and one.said.quantity not in ("unit", "quality")
         ]
         if texts and not (drives or positions) and self.tag_place is None:
             self._ask_name("tag", texts)

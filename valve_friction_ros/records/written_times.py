@@ -95,8 +95,10 @@ def is_time_of_day(text: str) -> bool:
 
 
 def in_one(parts: Sequence[str]) -> str:
-    """Join a date, a time of day and optional milliseconds."""
+    """Join a date, a time of day and milliseconds, of which one of the latter may be missing."""
     day, clock, *rest = (part.strip() for part in parts)
+    if clock.isdigit():
+        return f"{day}.{clock:0>3}"
     return f"{day.removesuffix(MIDNIGHT)} {clock}" + "".join(f".{one:0>3}" for one in rest)
 
 
