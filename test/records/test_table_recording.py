@@ -328,7 +328,15 @@ class TestColumns:
 
     def test_missing_under_its_other_name(self, write):
         message = refused(write([HEADER, *GOOD]), form=Columns(time_column="t"))
-        assert message.startswith("cannot tell which column is 't', of time_s, ")
+        assert message == (
+            "cannot tell which column is 't' (--time-column), as the valve file or an option names "
+            "it; columns: time_s, position_m, pressure_pa"
+        )
+
+    def test_all_that_the_valve_file_names_and_the_file_lacks(self, write):
+        form = Columns(time_column="Zeit", position_column="Hub", pressure_column="pressure_pa")
+        message = refused(write([HEADER, *GOOD]), form=form)
+        assert "'Zeit' (--time-column), 'Hub' (--position-column), as the valve file" in message
 
     def test_twice(self, write):
         path = write(["time_s,position_m,pressure_pa,position_m", *(row + ",0" for row in GOOD)])
@@ -517,3 +525,210 @@ class TestUnreadableFiles:
         ):
             path.write_bytes(content)
             assert refused(path).startswith(f"cannot be read as CSV: {cause}")
+
+
+BARS = [f"{value:.3f}" for value in PRESSURE / 1e5]
+SHARES = [f"{value:.4f}" for value in 20 + TIME * 1e3]  # %
+TENTHS = [f"{one / 10:.1f}" for one in range(40)]
+AXIS = np.array([float(one) for one in TENTHS])
+
+
+def lines(header, *columns, mark=","):
+    return [header, *(mark.join(row) for row in zip(*columns, strict=True))]
+
+
+class TestAmbiguousFiles:
+    """Files that can be read in two ways: the message names the option, which then gives one."""
+
+    @pytest.mark.parametrize(
+        ("header", "time", "pressure", "position", "asked", "answer"),
+        [
+            (
+                "Time [s],Air [bar],Stem [%]",
+                TENTHS,
+                BARS,
+                [f"{one / 50:.3f}" for one in range(40)],
+                "--position-unit fraction",
+                {"position_unit": "fraction"},
+            ),
+            (
+                "Time [s],Air [mbar],Stem [%]",
+                TENTHS,
+                [f"{one:.3f}" for one in PRESSURE / 1e5],
+                SHARES,
+                "--decimal if these are thousands",
+                {"pressure_unit": "bar"},
+            ),
+            (
+                "Time,Air [bar],Stem [%]",
+                [f"{one:.0f}" for one in 100 * np.arange(40)],
+                BARS,
+                SHARES,
+                "--time-unit ms",
+                {"time_unit": "ms", "time_column": "Time"},
+            ),
+        ],
+        ids=["fraction", "thousands", "named milliseconds"],
+    )
+    def test_units(self, write, header, time, pressure, position, asked, answer):
+        path = write(lines(header, time, pressure, position))
+        assert asked in refused(path, form=Columns(time_column=answer.get("time_column", "")))
+        found = read_csv(path, form=Columns(**answer))
+        assert found.time == pytest.approx(AXIS)
+        assert found.pressure == pytest.approx(PRESSURE, abs=51)
+        share = 1 if "position_unit" in answer else 100
+        true = [float(one) / share * BENCH_VALVE.travel for one in position]
+        assert found.position == pytest.approx(true)
+
+    def test_minutes(self, write):
+        minutes = [f"{one / 400:.4f}" for one in range(40)]
+        path = write(lines("Time,Air [bar],Stem [%]", minutes, BARS, SHARES))
+        assert "rises by 0.0975 in all (--time-unit s or --time-unit min)" in refused(path)
+        assert read_csv(path, form=Columns(time_unit="min")).sample_period == 0.15
+
+    def test_more_entries_than_headers(self, write):
+        """Decimal commas between commas: 101,5 would be 101 bar at a stem of 5 %."""
+        rows = [f"{one},101,5,20,{one % 10}" for one in range(40)]
+        assert "5 entries and 3 headers" in refused(write(["t [ms],Air [kPa],Stem [%]", *rows]))
+
+    def test_thousands_that_are_integers(self, write):
+        """1.010 mbar beside 990: thousands, not 1.01."""
+        pressure = [f"{one:,d}".replace(",", ".") for one in range(960, 1040, 2)]
+        whole = [str(one % 20) for one in range(40)]
+        path = write(
+            lines("t [s];Air [mbar];Stem [mm]", map(str, range(40)), pressure, whole, mark=";")
+        )
+        assert "(--decimal , or --decimal .)" in refused(path)
+        found = read_csv(path, form=Columns(decimal=","))
+        assert found.pressure == pytest.approx(np.arange(96e3, 104e3, 200))
+
+    def test_thousands_apart(self, write):
+        pressure = [f"{one:,.1f}".replace(",", " ").replace(".", ",") for one in PRESSURE.tolist()]
+        stem = [f"{one:.4f}".replace(".", ",") for one in 1e3 * POSITION]
+        path = write(
+            lines("t [ms];Air [Pa];Stem [mm]", map(str, range(40)), pressure, stem, mark=";")
+        )
+        assert read_csv(path).pressure == pytest.approx(PRESSURE, abs=0.06)
+
+
+class TestWrittenDates:
+    @pytest.mark.parametrize(
+        ("date", "asked"), [("26/07/05", ""), ("26/07/15", "--time-format '%y/%m/%d %H:%M:%S.%f'")]
+    )
+    def test_a_short_year_first(self, write, date, asked):
+        """The day first, the former would be of 2001; the latter of 2015."""
+        stamps = [f"{date} 12:00:0{one}" for one in TENTHS]
+        path, form = write(lines("Time,Air [bar],Stem [%]", stamps, BARS, SHARES)), Columns()
+        if asked:
+            assert asked in refused(path)
+            form = Columns(time_format="%y/%m/%d %H:%M:%S.%f")
+        noon = datetime(2026, 7, int(date[-2:]), 12, tzinfo=timezone.utc)
+        assert read_csv(path, form=form).start_time == noon.timestamp()
+
+    @pytest.mark.parametrize("zone", ["UTC+05:30", "MESZ", "EST"])
+    def test_a_zone_above_the_values_that_no_database_has(self, write, zone):
+        stamps = [f"2026-07-15 12:00:0{one}" for one in TENTHS]
+        path = write(lines(f"Time ({zone}),Air [bar],Stem [%]", stamps, BARS, SHARES))
+        assert f"the time zone that '{zone}' above" in refused(path)
+        read_csv(path, form=Columns(time_zone="Asia/Kolkata"))
+
+    def test_hours_and_minutes(self, write):
+        stamps = [f"14:{one:02d}" for one in range(5, 45)]
+        path = write(lines("Time,Air [bar],Stem [%]", stamps, BARS, SHARES))
+        assert "(--time-unit min)" in refused(path)
+        for unit, period in (("min", 60.0), ("s", 1.0)):
+            assert read_csv(path, form=Columns(time_unit=unit)).sample_period == period
+
+    @pytest.mark.parametrize(
+        ("begin", "form"),
+        [("23:59:58", "%H:%M:%S.%f"), ("11:59:58", "%I:%M:%S.%f %p")],
+        ids=["midnight", "noon"],
+    )
+    def test_a_time_of_day_goes_on(self, write, begin, form):
+        first = datetime.strptime(begin, "%H:%M:%S")
+        stamps = [f"{first + timedelta(seconds=one):{form}}" for one in AXIS]
+        found = read_csv(write(lines("Time,Air [bar],Stem [%]", stamps, BARS, SHARES)))
+        assert found.time == pytest.approx(AXIS)
+
+    def test_a_workbook_with_a_column_for_the_day(self, tmp_path):
+        openpyxl = pytest.importorskip("openpyxl")
+        book = openpyxl.Workbook()
+        book.active.append(["Date", "Time", "Air [bar]", "Stem [%]"])
+        noon = datetime(2026, 7, 1, 12, tzinfo=timezone.utc)
+        for since, bar, share in zip(AXIS, BARS, SHARES, strict=True):
+            moment = noon + timedelta(seconds=since)
+            book.active.append([moment.date(), moment.time(), float(bar), float(share)])
+        book.save(tmp_path / "record.xlsx")
+        assert read_csv(tmp_path / "record.xlsx").start_time == noon.timestamp()
+
+    def test_a_column_of_milliseconds_beside_the_date(self, write):
+        stamps = [f"15.07.2026 12:00:{int(one):02d}" for one in AXIS]
+        rest = [f"{round(1e3 * one) % 1000}" for one in AXIS]
+        found = read_csv(write(lines("Time,ms,Air [bar],Stem [%]", stamps, rest, BARS, SHARES)))
+        assert found.time == pytest.approx(AXIS)
+
+
+class TestQualities:
+    def test_a_code_that_was_the_same_at_first(self, write):
+        """Of OPC UA: 0 is good, and a greater code is not better."""
+        codes = ["0"] * 390 + ["2147483648"] * 10
+        times, air = [f"{one / 10:.1f}" for one in range(400)], ["1.0"] * 390 + ["0.0"] * 10
+        path = write(lines("t [s],Air [bar],StatusCode,Stem [mm]", times, air, codes, times))
+        assert read_csv(path).pressure.min() == 1e5
+
+    def test_a_doubt_is_no_praise(self, write):
+        doubts = ["False"] * 39 + ["True"]
+        path = write(lines("t [s],Air [bar],Questionable,Stem [%]", TENTHS, BARS, doubts, SHARES))
+        assert len(read_csv(path).time) == 39
+
+
+def test_tags_of_control_systems(write):
+    """DeltaV's PV.CV is a value, not a command."""
+    rows = []
+    for time, bar, share in zip(TENTHS, BARS, SHARES, strict=True):
+        rows.append(f"2026-07-15 12:00:0{time},FV-101/PT1/PV.CV,{bar},Good")
+        rows.append(f"2026-07-15 12:00:0{time},FV-101/ZT1/PV.CV,{share},Good")
+    path = write(["Date/Time,Parameter,Value,Status", *rows])
+    form = Columns(pressure_unit="bar", position_unit="percent")
+    assert read_csv(path, form=form).pressure == pytest.approx(PRESSURE, abs=51)
+    path = write(["Date/Time,Bezeichner,Value,Status", *rows])
+    assert "which column is the tag (--tag-column Bezeichner" in refused(path, form=form)
+    assert len(read_csv(path, form=replace(form, tag_column="Bezeichner")).time) == 40
+
+
+def test_the_supply_is_not_the_pressure_of_the_actuator(write):
+    header = "t [s],Instrument air pressure [bar],Stem [%],Actuator pressure [bar]"
+    path = write(lines(header, TENTHS, ["5.5"] * 40, SHARES, BARS))
+    assert read_csv(path).pressure == pytest.approx(PRESSURE, abs=51)
+    header = "t [s],Instrument air pressure [bar],Stem [%],Stem force [N]"
+    path = write(lines(header, TENTHS, ["5.5"] * 40, SHARES, ["900.0"] * 40))
+    assert recorded(path).notes[0].count("force 'Stem force [N]'") == 1
+
+
+def test_range_and_travel_are_asked_for_together(write):
+    path = write(lines("t [s],Air [mA],Stem [mA]", TENTHS, TENTHS, TENTHS))
+    message = refused(path, Valve(0.0445))
+    assert "(--pressure-range '0..2.5 bar'" in message
+    assert "name the travel in the valve file" in message
+
+
+def test_units_below_merged_cells(write):
+    """The headers look like those of TwinCAT Scope, which are alike in every other column."""
+    stamps = [f"2026-07-15 12:00:0{one}" for one in TENTHS]
+    rows = lines("FV-1;;FV-1;", stamps, BARS, stamps, SHARES, mark=";")
+    rows[1:1] = ["Time;Actual;Time;Actual", ";bar;;%"]
+    form = Columns(position_column="FV-1 Actual (2)")
+    assert read_csv(write(rows), form=form).pressure == pytest.approx(PRESSURE, abs=51)
+
+
+def test_tags_with_their_folder(write):
+    """A table of Ignition with tags of several valves; no header has the word for the values."""
+    rows = []
+    for time, bar, share in zip(TENTHS, BARS, SHARES, strict=True):
+        for valve in ("FV-1", "FV-2"):
+            rows.append(f"2026-07-15 12:00:0{time},[default]Plant/{valve}/PT,{bar},bar")
+            rows.append(f"2026-07-15 12:00:0{time},[default]Plant/{valve}/ZT,{share},%")
+    path = write(["t_stamp,tagpath,floatvalue,units", *rows])
+    found = read_recordings(path, BENCH_VALVE)
+    assert [one.name for one in found] == ["Plant/FV-1", "Plant/FV-2"]
+    assert found[1].recording().pressure == pytest.approx(PRESSURE, abs=51)

@@ -26,6 +26,7 @@ from valve_friction_ros.commands.arguments.identification import (
 )
 from valve_friction_ros.commands.arguments.recording import (
     described,
+    identifying_progress,
     read_one,
     reading_progress,
     require_one,
@@ -236,13 +237,15 @@ def run(options: argparse.Namespace) -> int:
         if of_one is not None:
             require_one(recorded, purpose)
     answers = []
-    for each in recorded:
-        answer = _identified(each, settings, baseline)
-        own = answer.diagnosis
-        tells = baseline is not None or (own is not None and own.survey is not Survey.UNKNOWN)
-        if not tells and options.fail_on is None:
-            answer = answer._replace(diagnosis=None)
-        answers.append(answer)
+    with identifying_progress(len(recorded)) as done:
+        for each in recorded:
+            answer = _identified(each, settings, baseline)
+            own = answer.diagnosis
+            tells = baseline is not None or (own is not None and own.survey is not Survey.UNKNOWN)
+            if not tells and options.fail_on is None:
+                answer = answer._replace(diagnosis=None)
+            answers.append(answer)
+            done()
     try:
         code = _print(answers, options.command, options.json)
     finally:  # a closed output must not prevent the pictures, nor a full disk the numbers

@@ -136,21 +136,23 @@ def run(options: argparse.Namespace) -> int:
         layout = table.layout
         named = [(label, one) for label, group in layout.valves.items() for one in group]
         reads: list[ReadSignal] = []
-        if not layout.questions:
+        questions = list(layout.questions)
+        if not questions:
             reads = table.read([one for _, one in named], reading.stretch)
+            questions = table.doubts(reads)
     signals = [_inspected(label, read) for (label, _), read in zip(named, reads, strict=False)]
     if options.json:
         shown = {
             "words": layout.words,
-            "questions": list(layout.questions),
+            "questions": questions,
             "signals": plain(signals),
             "columns": layout.kinds,
         }
         print(json.dumps(shown, ensure_ascii=False))
     else:
         _print(layout, reads, signals)
-    if layout.questions:
-        complain(options.command, f"{table.name}: cannot tell {'; '.join(layout.questions)}")
+    if questions:
+        complain(options.command, table.asked(questions))
         return ExitCode.REFUSED
     save_columns(options, reading)
     if options.plot is not None:

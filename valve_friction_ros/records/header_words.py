@@ -28,9 +28,10 @@ _WORDS = {
     "force": "force kraft load",
     "command": "setpoint sp op output out command cmd demand sollwert soll cv request target "
     "stellsignal stellgröße mv",
-    "quality": "quality status qstatus confidence güte qualität qualitaet valid questionable "
-    "annotated good stat q",
-    "tag": "tag tagname name point pointname signal series variable messstelle kanal sensor metric "
+    "quality": "quality status qstatus confidence güte qualität qualitätscode qualitaet valid "
+    "questionable annotated good stat q",
+    "tag": "tag tagname tagid tagpath variablenname logname signalname parameter name point "
+    "pointname signal series variable messstelle kanal sensor metric "
     "item id kks channel tags field varname",
     "value": "value wert val messwert vtq y varvalue",
     "unit": "unit units einheit eu uom engunits",
@@ -104,6 +105,9 @@ def _unit_and_rest(text: str) -> tuple[str, str]:
     return "", text
 
 
+_PROVIDER = re.compile(r"^\[\w+\](?=[\w -]+/)")
+"""Provider before the path of a tag of Ignition."""
+
 _PRESSURE_MESSAGE = re.compile(r"/.*[/.]fluid_pressure")
 _JOINT_MESSAGE = re.compile(r"/.*/position(?:[/.\[]\w+\]?)?|/.*state.*[/.]position")
 
@@ -117,6 +121,7 @@ def _of_message(name: str) -> str:
 
 def named(texts: Sequence[str], unit_cell: str = "") -> Named:
     """Interpret the header of a column from all rows of the header and its row of units."""
+    texts = [_PROVIDER.sub("", text) for text in texts]
     unit, rest = _of_message(texts[0]), []
     for text in texts:
         own, without = _unit_and_rest(text.strip())
@@ -135,7 +140,7 @@ def named(texts: Sequence[str], unit_cell: str = "") -> Named:
         isa = _ISA.fullmatch(word)
         quantity = _QUANTITY.get(word, "")
         is_strong |= word in _STRONG
-        if word in _OTHER:
+        if word in _OTHER or (word, words[place + 1 : place + 2]) == ("instrument", ["air"]):
             found.append("other")
         elif isa and (
             isa["loop"]
@@ -144,6 +149,8 @@ def named(texts: Sequence[str], unit_cell: str = "") -> Named:
         ):
             found.append("pressure" if isa["letters"].startswith("p") else "position")
             label += filter(None, (isa["unit"], isa["loop"]))
+        elif quantity == "command" and words[place - 1 : place] == ["pv"]:
+            continue  # the value of a process variable: PV.CV, PV_Out
         elif quantity:
             found.append(quantity)
         elif word not in _STRONG and word not in _IDLE:
@@ -182,7 +189,7 @@ _LONGEST = 60
 def _pattern(decimal: str) -> re.Pattern[str]:
     other = "," if decimal == "." else r"\."
     point = re.escape(decimal)
-    groups = rf"[1-9]\d{{0,2}}(?:(?:{other}\d{{3}})+|(?:['’\u00a0\u202f]\d{{3}})+)"
+    groups = rf"[1-9]\d{{0,2}}(?:(?:{other}\d{{3}})+|(?:['’\u00a0\u202f ]\d{{3}})+)"
     whole = rf"(?:{groups}|\d+|(?={point}\d))"
     return re.compile(
         rf"(?P<number>[+\-−]?{whole}(?:{point}\d*)?(?:[eE][+\-]?\d+)?)\s*(?P<unit>[^\d\s].{{0,11}})?",
@@ -206,7 +213,7 @@ def number_and_unit(text: str, decimal: str) -> tuple[float, str] | None:
     if found["unit"] and not unit:
         return None
     thousands = "," if decimal == "." else "."
-    plain = re.sub(r"['’\u00a0\u202f]", "", found["number"]).replace(thousands, "")
+    plain = re.sub(r"['’\u00a0\u202f ]", "", found["number"]).replace(thousands, "")
     value = float(plain.replace("−", "-").replace(decimal, "."))
     return (value, unit) if np.isfinite(value) else None
 

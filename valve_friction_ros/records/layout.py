@@ -22,7 +22,13 @@ import numpy as np
 from valve_friction_ros.records.columns import Columns
 from valve_friction_ros.records.header_words import Named, known_unit, named, number_and_unit
 from valve_friction_ros.records.table_rows import RawTable
-from valve_friction_ros.records.written_times import TimeForm, is_date, is_day, is_time_of_day
+from valve_friction_ros.records.written_times import (
+    MIDNIGHT,
+    TimeForm,
+    is_date,
+    is_day,
+    is_time_of_day,
+)
 
 _NAMES = {"\t": "tab", ";": "semicolon", ",": "comma", "|": "bar", " ": "blanks"}
 _MOST_LABELS = 6
@@ -150,6 +156,7 @@ class Layout:
     def _time_words(self, form: TimeForm) -> str:
         if form.unit:
             since = str(np.datetime64(form.origin // 10**9, "s")).removesuffix("T00:00:00")
+            since = "the year 0" if since.startswith("-") else since
             zone = form.zone or "UTC"
             return f"time in {form.unit}" + (f" since {since} {zone}" if form.origin else "")
         if not form.formats:
@@ -169,6 +176,9 @@ _MOST_HEADER_ROWS = 8
 _TYPES = ("#TYPES", "#ROWS", "#datatype", "#group", "#default")
 """Prefixes of rows of Ignition and InfluxDB above the headers, which contain no headers."""
 _MOST_NAMES = 20
+_GROUPED = re.compile(r"-?\d{1,3}(?:(?:,\d{3})+|(?:\.\d{3})+)")
+"""Numbers with thousands, or with three decimals."""
+_UP_TO_999 = re.compile(r"[1-9]\d{0,2}")
 _FILE_TIME = 116_444_736_000_000_000
 """Start of 1970 in Windows time, 100 ns since 1601."""
 
@@ -195,6 +205,7 @@ class Look:
     def __init__(self, raw: RawTable, form: Columns) -> None:
         self.raw, self.form = raw, form
         self.questions: list[str] = []
+        self.lacking: dict[str, str] = {}
         self.decimal, self.delimiter = self._found_marks()
         self.rows = [
             (line, [cell.strip() for cell in row]) for line, row in raw.rows(self.delimiter)
@@ -235,15 +246,29 @@ class Look:
         return max(counts, key=lambda mark: counts[mark]) if any(counts.values()) else ","
 
     def _decimal_of_even(self, delimiter: str) -> str:
-        """Return the decimal mark if both are possible for every number; ask if it matters."""
-        cells = [cell for _, row in self.raw.rows(delimiter) for cell in row]
-        commas = [cell for cell in cells if re.fullmatch(r"\s*-?\d{1,3}(,\d{3})+\s*", cell)]
-        if not commas:
+        """Return the decimal mark if both are possible for every number; ask if it matters.
+
+        Thousands are likely where one column has 1.250 and 987: three decimals would give 987.000.
+        """
+        columns = itertools.zip_longest(
+            *(map(str.strip, row) for _, row in self.raw.rows(delimiter)), fillvalue=""
+        )
+        of_mark: dict[str, list[str]] = {".": [], ",": []}
+        is_likely = False
+        for cells in columns:
+            grouped = [cell for cell in cells if _GROUPED.fullmatch(cell)]
+            small = sum(_UP_TO_999.fullmatch(cell) is not None for cell in cells)
+            is_likely |= bool(grouped) and small > Columns.maximum_bad_share * len(cells)
+            for cell in grouped:
+                of_mark["," if "," in cell else "."].append(cell)
+        if not (is_likely or of_mark[","]):
             return "."
-        if delimiter == ";":
+        if delimiter == ";" and not (is_likely or of_mark["."]):
             return ","
+        example = (of_mark[","] or of_mark["."])[0]
+        mark = "comma" if "," in example else "point"
         self.questions.append(
-            f"whether {quoted(commas[0].strip())} has a decimal comma or thousands "
+            f"whether {quoted(example)} has a decimal {mark} or thousands "
             "(--decimal , or --decimal .)"
         )
         return "."
@@ -283,18 +308,21 @@ class Look:
         entries above its values. The start of the export is given in 100 ns since 1601.
         """
         found: dict[str, list[str]] = {}
-        for place, (line, row) in enumerate(self.rows):
+        places: list[int] = []
+        for place, (_, row) in enumerate(self.rows):
             begin = re.fullmatch(r"Start.*;(\d{18})", ";".join(row[:2]))
             if begin and not found:
                 self.origin = (int(begin[1]) - _FILE_TIME) * 100
             cells = row[: len(row) // 2 * 2]
             if len(cells) > 2 and len({*cells[::2]}) == 1 and re.match(r"[A-Za-z]", cells[0]):
                 found[cells[0]] = cells[1::2]
-                self.rows[place] = (line, [])
-                self._top = place + 1
+                places.append(place)
         if "Name" not in found:
-            self.origin = self._top = 0
+            self.origin = 0
             return []
+        for place in places:
+            self.rows[place] = (self.rows[place][0], [])
+        self._top = places[-1] + 1
         units = [unit.split(" (")[0] for unit in found.get("Unit", [""] * len(found["Name"]))]
         return [
             [one for name in found["Name"] for one in ("time", name)],
@@ -331,6 +359,7 @@ class Look:
             texts = [row for row in texts if sum(map(bool, row)) >= 0.6 * sum(map(bool, texts[0]))]
         names = _names(texts[0]) if texts else [str(place + 1) for place in range(wide)]
         names = _with_groups(names, header[: header.index(texts[0])] if texts else [])
+        self._require_headers(names, values)
         names += [""] * (wide - len(names))
         columns: list[SeenColumn] = []
         for place, name in enumerate(names):
@@ -342,12 +371,29 @@ class Look:
             column.cells = [row[place] if place < len(row) else "" for row in values]
             column.kind = self._kind(column)
             columns.append(column)
+        for day, clock in itertools.pairwise(columns):
+            if clock.kind == "clock" and all(one.endswith(MIDNIGHT) for one in day.filled):
+                day.kind = "day" if day.kind == "date" else day.kind
         self.unit_row = {
             column.name: known_unit(units[column.place])
             for column in columns
             if column.place < len(units)
         }
         return columns
+
+    def _require_headers(self, names: Sequence[str], values: Sequence[Sequence[str]]) -> None:
+        """Ask where rows have more numbers than headers: columns and headers do not correspond."""
+        wide = [
+            row
+            for row in values
+            if any(_is_value(cell, self.decimal) for cell in row[len(names) :])
+        ]
+        if 2 * len(wide) > len(values):
+            self.questions.append(
+                f"which header each entry has, of {len(wide[0])} entries and {len(names)} headers: "
+                "export it with another delimiter if its decimal commas divide numbers, else give "
+                "each column a header"
+            )
 
     def _kind(self, column: SeenColumn) -> str:
         cells = column.filled
@@ -384,12 +430,11 @@ class Look:
         return [one for one in found if quantity is None or one.said.quantity == quantity]
 
     def by_name(self, name: str, option: str) -> SeenColumn | None:
-        """Return the first column with a given name; ask again if there is none."""
+        """Return the first column with a given name; note what is lacking."""
         found = [column for column in self.columns if column.name == name]
         if found:
             return found[0]
-        more = ", …" if len(self.columns) > _MOST_NAMES else ""
-        self.questions.append(f"which column is {name!r}, of {self.names}{more} ({option})")
+        self.lacking[option] = name
         return None
 
 

@@ -41,12 +41,15 @@ from valve_friction_ros.records.written_times import (
     date_forms,
     in_one,
     is_date,
+    is_time_of_day,
 )
 
 _MOST_CHOICES, _MOST_TAGS = 6, 10_000
 _COARSE = 0.5
 """Largest step of a time without a unit that is in seconds; others may be milliseconds. Chosen."""
 _GOOD = re.compile(r"(good|ok|gut|valid|true|g|yes|ja|gültig)\b.*|\(?good\b.*", re.IGNORECASE)
+_DOUBT = re.compile("questionable|substituted|bad|invalid", re.IGNORECASE)
+_TRUE_OR_FALSE = re.compile("true|false|0|1", re.IGNORECASE)
 _OPC_GOOD, _OPC_MOST, _CERTAIN = 192, 255, 100
 """Range of good OPC qualities, and the confidence of a historian in a measured value."""
 
@@ -59,11 +62,20 @@ below the former, a pressure in bar or kPa not above the latter.
 
 A column that is named without a unit is in its SI unit, as in files of earlier versions."""
 
+_UNCLEAR_ZONE = re.compile(
+    r"\b(?:(?:UTC|GMT) ?[+\-−]\d{1,2}:?\d\d"
+    r"|(?<=[([ ])(?:CES?T|MES?Z|[ECMP][SD]T|BST|IST|JST|AEST))\b"
+)
+"""Zones that are no name of the time zone database: offsets with minutes, abbreviations."""
+
 _LOCAL = ("d", "microdays")
 """Units of clocks that count days: they are in local time, as in spreadsheets."""
 
 _UNCLEAR = ("", "value", "command")
 """Named quantities of a column that may still be the pressure or the position."""
+
+_MOST_SIGNALS = 50
+"""Most different texts in the first rows of a column of tags. Chosen."""
 
 _Candidate = tuple[str, Named, int]
 """Name, meaning and column of a possible signal."""
@@ -90,21 +102,29 @@ class _Recognition(Look):
             column = self.by_name(self.form.time_column, "--time-column")
             return [(column.place,)] if column else []
         dates: list[tuple[int, ...]] = [(column.place,) for column in self.of_kind("date")]
-        fine = [place for place in dates if not self._repeats(place[0])]
-        if dates and (fine or not self._numeric_times()):
-            return fine or dates
-        for day, clock in pairwise(self.columns):
-            if (day.kind, clock.kind) == ("day", "clock"):
-                beside = self.columns[clock.place + 1 : clock.place + 2]
-                rest = (one.place for one in beside if _MILLISECONDS.fullmatch(one.name))
-                return [(day.place, clock.place, *rest)]
         numeric = self._numeric_times()
+        fine = [place for place in dates if not self._repeats(place[0])] or self._split_times()
+        if fine or (dates and not numeric):
+            return fine or dates
         if clocks := self.of_kind("clock") or ([] if numeric else self._written()):
             return [(clocks[0].place,)]
         if len(numeric) == 1 or (numeric and self._are_pairs(numeric)):
             return [(column.place,) for column in numeric]
         possible = [one for one in self.of_kind("number", "") if not one.said.unit]
         self._ask_name("time", [one.name for one in numeric or possible])
+        self.questions[-1] += ", and its unit (--time-unit)"
+        return []
+
+    def _split_times(self) -> list[tuple[int, ...]]:
+        """Return adjacent columns that together are a time: of days, times of day, milliseconds."""
+        for day, clock in pairwise(self.columns):
+            is_rest = all(one.isdigit() and len(one) <= len("999") for one in clock.filled)
+            if day.kind == "date" and is_rest and _MILLISECONDS.fullmatch(clock.name):
+                return [(day.place, clock.place)]
+            if (day.kind, clock.kind) == ("day", "clock"):
+                beside = self.columns[clock.place + 1 : clock.place + 2]
+                rest = (one.place for one in beside if _MILLISECONDS.fullmatch(one.name))
+                return [(day.place, clock.place, *rest)]
         return []
 
     def _written(self) -> list[SeenColumn]:
@@ -150,8 +170,20 @@ class _Recognition(Look):
         if column.kind in ("date", "text"):
             return self._dates(list(filter(is_date, column.filled)) or column.filled, zone)
         if column.kind == "clock":
-            return TimeForm()
+            return self._clock_form(column)
         return self._numeric_form(column, zone)
+
+    def _clock_form(self, column: SeenColumn) -> TimeForm:
+        """Return the form of times of day; ask whether 14:05 begins with hours or minutes."""
+        given = self.form.time_unit
+        times = list(filter(is_time_of_day, column.filled))
+        is_short = all(re.fullmatch(r"([01]?\d|2[0-3]):\d\d", one.strip()) for one in times)
+        if is_short and not given:
+            self.questions.append(
+                f"whether {quoted(times[-1])} is in hours and minutes (--time-unit min) or in "
+                "minutes and seconds (--time-unit s)"
+            )
+        return TimeForm(last="min" if is_short and given == "min" else "s")
 
     def _numeric_form(self, column: SeenColumn, zone: str) -> TimeForm:
         given = self.form.time_unit
@@ -163,8 +195,8 @@ class _Recognition(Look):
             return TimeForm(unit=given or column.said.unit, origin=self.origin)
         numbers = self._numbers(column)
         steps = [b - a for a, b in pairwise(numbers) if b != a]
-        if not steps or abs(median(steps)) <= _COARSE or self.form.time_column:
-            return TimeForm(unit="s")
+        if not steps or abs(median(steps)) <= _COARSE:
+            return TimeForm(unit="s", is_assumed=not self.form.time_column)
         self.questions.append(
             f"the unit of the time {quoted(column.name)}, which rises by {median(steps):g} "
             "(--time-unit s or --time-unit ms)"
@@ -173,29 +205,40 @@ class _Recognition(Look):
 
     def _dates(self, texts: Sequence[str], zone: str) -> TimeForm:
         forms = date_forms(texts)
-        if forms is None or not (forms.day_first or forms.month_first):
+        orders = [one for one in forms[:3] if one] if forms else []
+        if forms is None or not orders:
             self.questions.append(
                 f"the format of the dates, such as {quoted(texts[0])} (--time-format "
                 "'%d.%m.%Y %H:%M:%S.%f')"
             )
             return TimeForm(("%Y",))
-        if forms.day_first and forms.month_first:
-            self.questions.append(
-                f"whether {quoted(texts[0])} has the day first (--time-format "
-                f"{shlex.quote(forms.day_first[0])}) or the month (--time-format "
-                f"{shlex.quote(forms.month_first[0])})"
-            )
-        return TimeForm(forms.day_first or forms.month_first, zone, has_zone=forms.has_zone)
+        if not (zone or forms.has_zone):
+            self._ask_zone()
+        if len(orders) > 1:
+            words = {"%d": "the day first", "%m": "the month", "%y": "the year"}
+            told = [f"{words[one[0][:2]]} (--time-format {shlex.quote(one[0])})" for one in orders]
+            self.questions.append(f"whether {quoted(texts[0])} has {' or '.join(told)}")
+        return TimeForm(orders[0], zone, has_zone=forms.has_zone)
 
     def _stated_zone(self) -> str:
         """Return the time zone named above the values, such as Europe/Berlin, or ''."""
         above = " ".join(cell for _, row in self.rows[: self.start] for cell in row)
         found = re.findall(r"\b[A-Z][A-Za-z]+/[A-Z][A-Za-z_]+\b", above)
-        known = [one for one in dict.fromkeys(found) if one in zoneinfo.available_timezones()]
-        offsets = re.findall(r"\b(?:UTC|GMT)([+\-−]\d{1,2})(?::?00)?\b", above)
+        known: list[str] = [
+            one for one in dict.fromkeys(found) if one in zoneinfo.available_timezones()
+        ]
+        offsets = re.findall(r"\b(?:UTC|GMT) ?([+\-−]\d{1,2})(?::?00)?(?![:\d])", above)
         # the Etc zones count westwards
         known += [f"Etc/GMT{-int(one.replace('−', '-')):+d}" for one in dict.fromkeys(offsets)]
         return known[0] if len(known) == 1 else ""
+
+    def _ask_zone(self) -> None:
+        above = " ".join(cell for _, row in self.rows[: self.start] for cell in row)
+        if unclear := _UNCLEAR_ZONE.search(above):
+            self.questions.append(
+                f"the time zone that {quoted(unclear[0])} above the values means (--time-zone, "
+                "such as Europe/Berlin)"
+            )
 
     # Signals
 
@@ -220,13 +263,16 @@ class _Recognition(Look):
         if self.form.value_column:
             column = self.by_name(self.form.value_column, "--value-column")
             return column.place if column else -1
-        numeric = [one for one in self.of_kind("number") if one.place not in times]
-        numeric = [one for one in numeric if one.said.quantity != "quality"]
+        numeric = self._values(times)
         found = [one for one in numeric if one.said.quantity == "value"] or numeric
         if len(found) == 1:
             return found[0].place
         self._ask_name("value", [one.name for one in found])
         return -1
+
+    def _values(self, times: set[int]) -> list[SeenColumn]:
+        numeric = [one for one in self.of_kind("number") if one.place not in times]
+        return [one for one in numeric if one.said.quantity != "quality"]
 
     def _find_tags(self, times: set[int]) -> None:
         """Find the tags if each row has one value."""
@@ -234,7 +280,7 @@ class _Recognition(Look):
         if self.form.tag_column:
             column = self.by_name(self.form.tag_column, "--tag-column")
             texts = [column] if column else []
-        elif not self.of_kind("number", "value"):
+        elif not self.of_kind("number", "value") and len(self._values(times)) != 1:
             return
         if len(texts) > 1:
             self._ask_name("tag", [one.name for one in texts])
@@ -265,7 +311,8 @@ class _Recognition(Look):
         listed = " or ".join(shlex.quote(name) for name in among[:_MOST_CHOICES])
         more = " …" if len(among) > _MOST_CHOICES else ""
         listed = f" {listed}{more}" if among else ""
-        what = "column" if self.tag_place is None else "tag"
+        is_tag = self.tag_place is not None and quantity not in ("tag", "value")
+        what = "tag" if is_tag else "column"
         what = f"which {what} is the {quantity}" + ("" if among else f", of {self.names}")
         self.questions.append(f"{what} (--{quantity}-column{listed})")
 
@@ -294,6 +341,8 @@ class _Recognition(Look):
             return {"position": "m", "pressure": "Pa", "force": "N"}[quantity]
         span = f", values from {min(numbers):g} to {max(numbers):g}" if numbers else ""
         known = " ".join(KNOWN_UNITS[quantity])
+        if quantity == "pressure" and not self.form.pressure_range:
+            known += "; the last three with --pressure-range, unless the valve file has the range"
         self.questions.append(
             f"the unit of the {quantity} {quoted(name)}{span} (--{quantity}-unit, one of {known})"
         )
@@ -326,16 +375,21 @@ class _Recognition(Look):
         return column.place
 
     def _goodness(self, column: SeenColumn) -> Callable[[str], bool]:
-        if self.form.good_quality:
-            words = {word.strip().casefold() for word in self.form.good_quality.split(",")}
-            return lambda cell: cell.strip().casefold() in words
         cells = column.filled
         numbers = self._numbers(column)
+        good = self.form.good_quality
+        if not good and _DOUBT.search(column.name) and all(map(_TRUE_OR_FALSE.fullmatch, cells)):
+            good = "false,0"
+        if good:
+            words = {word.strip().casefold() for word in good.split(",")}
+            return lambda cell: cell.strip().casefold() in words
         if len(numbers) == len(cells):
             is_opc = any(_OPC_GOOD <= value <= _OPC_MOST for value in numbers)
             least = _OPC_GOOD if is_opc else max(numbers)
-            if is_opc or least == _CERTAIN or len(set(numbers)) == 1:
+            if is_opc or least == _CERTAIN:
                 return lambda cell: bool(number_and_unit(cell, ".")) and float(cell) >= least
+            if len(set(numbers)) == 1:  # of a code, a greater number is not a better one
+                return lambda cell: bool(number_and_unit(cell, ".")) and float(cell) == least
         elif any(map(_GOOD.fullmatch, cells)):
             return lambda cell: _GOOD.fullmatch(cell.strip()) is not None
         elif len(set(cells)) == 1:
@@ -400,10 +454,12 @@ class _Recognition(Look):
 
     def _opposing(self) -> Iterator[TableSignal]:
         name = self.form.opposing_pressure_column
+        if not name:
+            return
         found = [each for each in self._candidates(set()) if each[0] == name]
-        if name and found:
+        if found:
             yield self._signal("pressure", *found[0])
-        elif name:
+        else:
             self.by_name(name, "--opposing-pressure-column")
 
     def _chosen(self, quantity: str, candidates: Sequence[_Candidate]) -> list[_Candidate]:
@@ -412,15 +468,25 @@ class _Recognition(Look):
             found = [each for each in candidates if each[0] == name]
             is_needed = quantity != "force" or self.form.pressure_column == ""
             if len(found) != 1 and is_needed and not self.is_part:
-                if self.tag_place is None:
-                    self.by_name(name, f"--{quantity}-column")
-                else:
-                    self._ask_name(quantity, list(self.tags))
+                self.lacking[f"--{quantity}-column"] = name
             return found if len(found) == 1 else []
         other = "" if self.is_part else self.form.opposing_pressure_column
         found = [each for each in candidates if each[1].quantity == quantity and each[0] != other]
         own = [each for each in found if each[0] == OWN[quantity]]
         return own or found
+
+    def ask_lacking(self) -> None:
+        """Ask for all columns and tags that the valve file or an option names, and that lack."""
+        if not self.lacking:
+            return
+        told = ", ".join(f"{name!r} ({option})" for option, name in self.lacking.items())
+        more = ", …" if len(self.columns) > _MOST_CHOICES else ""
+        tags = f"; tags: {', '.join([*self.tags][:_MOST_CHOICES])}" if self.tags else ""
+        self.questions.insert(
+            0,
+            f"which column is {told}, as the valve file or an option names it; columns: "
+            f"{self.names}{more}{tags}",
+        )
 
     def _pairs(
         self, drives: Sequence[_Candidate], positions: Sequence[_Candidate]
@@ -446,7 +512,16 @@ class _Recognition(Look):
         positions: Sequence[_Candidate],
         candidates: Sequence[_Candidate],
     ) -> None:
-        said = " ".join(self.questions)
+        said = " ".join([*self.questions, *self.lacking])
+        texts = [
+            one.name
+            for one in self.of_kind("text")
+            if 1 < len({*one.filled}) <= _MOST_SIGNALS
+            and one.said.quantity not in ("unit", "quality")
+        ]
+        if texts and not (drives or positions) and self.tag_place is None:
+            self._ask_name("tag", texts)
+            return
         for quantity, found in ((drive, drives), ("position", positions)):
             if len(found) == 1 or f"--{quantity}-column" in said:
                 if len(found) == 1:
@@ -485,6 +560,7 @@ def recognized(raw: RawTable, form: Columns, is_part: bool = False) -> Layout:
     """
     look = _Recognition(raw, form, is_part)
     valves = look.signals()
+    look.ask_lacking()
     first = next(iter(look.times), ())
     time = look.times.get(first, TimeForm())
     signals = next(iter(valves.values()), ())

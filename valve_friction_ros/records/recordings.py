@@ -24,6 +24,7 @@ from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.records.bags.topics import TopicChoice, bag_libraries, is_bag
 from valve_friction_ros.records.columns import Columns
 from valve_friction_ros.records.header_words import plain_name
+from valve_friction_ros.records.layout import TableSignal
 from valve_friction_ros.records.recorded_valve import RecordedValve, Stretch
 from valve_friction_ros.records.table import OpenTables, ReadSignal, left_out, require_good
 from valve_friction_ros.records.table_rows import readable
@@ -42,15 +43,38 @@ def _share(read: ReadSignal) -> NDArray[np.float64]:
     return (read.values - low) / (high - low)
 
 
+def _pressure_range(valve: Valve, form: Columns) -> tuple[float, float]:
+    if form.pressure_range:
+        return span(form.pressure_range, PRESSURE_UNITS)
+    return valve.pressure_minimum, valve.pressure_maximum
+
+
+def _require_ranges(signals: Sequence[TableSignal], valve: Valve, form: Columns) -> None:
+    """Refuse shares of an unknown range or travel, and name both if both are unknown."""
+    lacking = {}
+    for one in signals:
+        is_share = one.unit in SHARES
+        if is_share and one.quantity == "pressure":
+            if not all(map(math.isfinite, _pressure_range(valve, form))):
+                lacking[
+                    f"a pressure in {one.unit} is a share of the transmitter's range: name it "
+                    "(--pressure-range '0..2.5 bar', or pressure_minimum and pressure_maximum of "
+                    "the valve file)"
+                ] = one
+        elif one.quantity == "position" and (is_share or form.inverted_position):
+            needs = f"a position in {one.unit}" if is_share else "an inverted position"
+            if not math.isfinite(valve.travel):
+                lacking[f"{needs} is a share of the travel: name the travel in the valve file"] = (
+                    one
+                )
+    if lacking:
+        path = next(iter(lacking.values())).path
+        raise ValueError(f"{path}: {'; '.join(lacking)}")
+
+
 def _position(read: ReadSignal, form: Columns, valve: Valve) -> NDArray[np.float64]:
     """Return the position in m, positive in the direction in which the pressure pushes the stem."""
     is_share = read.signal.unit in SHARES
-    if (is_share or form.inverted_position) and not math.isfinite(valve.travel):
-        needs = f"a position in {read.signal.unit}" if is_share else "an inverted position"
-        raise ValueError(
-            f"{read.signal.path}: {needs} is a share of the travel: name the travel in the valve "
-            "file"
-        )
     if is_share and read.signal.unit != "percent":
         position = _share(read) * valve.travel
     elif is_share:
@@ -64,17 +88,7 @@ def _pressure(read: ReadSignal, valve: Valve, form: Columns) -> NDArray[np.float
     """Return a pressure in Pa; refuse values outside the range of the sensor."""
     unit = read.signal.unit
     if unit in SHARES:
-        low, high = (
-            span(form.pressure_range, PRESSURE_UNITS)
-            if form.pressure_range
-            else (valve.pressure_minimum, valve.pressure_maximum)
-        )
-        if not math.isfinite(high - low):
-            raise ValueError(
-                f"{read.signal.path}: a pressure in {unit} is a share of the transmitter's range: "
-                "name it (--pressure-range '0..2.5 bar', or pressure_minimum and pressure_maximum "
-                "of the valve file)"
-            )
+        low, high = _pressure_range(valve, form)
         pressure = low + _share(read) * (high - low)
     else:
         pressure = PRESSURE_UNITS[unit].to_si(read.values)
@@ -122,6 +136,8 @@ def _recorded(
     form = table.layout.form
     for each in reads:
         require_good(each, form)
+    if doubts := table.doubts(reads):
+        raise ValueError(table.asked(doubts))
     drives = [each for each in reads if each.signal.quantity != "position"]
     (stem,) = (each for each in reads if each.signal.quantity == "position")
     drive, driven_by = _drive(drives, valve, form)
@@ -185,6 +201,7 @@ def _read_table(path: Path, valve: Valve, options: ReadingOptions) -> tuple[Reco
             raise ValueError(f"{path}: no valve is called {name!r}: choose one of {known}")
         valves = chosen
     every = [signal for signals in valves.values() for signal in signals]
+    _require_ranges(every, valve, table.layout.form)
     read = dict(zip(every, table.read(every, options.stretch), strict=True))
     found = []
     for label, signals in valves.items():

@@ -29,7 +29,7 @@ from valve_friction_ros.records.layout import Layout, TableSignal, quoted
 from valve_friction_ros.records.recognition import recognized
 from valve_friction_ros.records.recorded_valve import Stretch
 from valve_friction_ros.records.table_rows import open_raw
-from valve_friction_ros.records.units import SHARES
+from valve_friction_ros.records.units import PERCENT, PRESSURE_UNITS, SHARES
 from valve_friction_ros.records.written_times import NO_TIME, TimeForm, WrittenTimes, in_one
 
 if TYPE_CHECKING:
@@ -42,6 +42,9 @@ _MOST_NAMES = 6
 _MOST_SPANS = 3.0
 """Accepted range of a share, over its span, as -100 to 200 %; a number beyond it, such as -9999,
 means no value. Chosen."""
+_SHORTEST = 2_000_000_000
+"""Length of a record, ns, below which a time without a unit may be in minutes. Chosen: a record
+of that many seconds shows no friction."""
 _MOST_REPEATED = 0.5
 """Largest share of rows that may repeat the previous row exactly. Chosen."""
 
@@ -316,11 +319,14 @@ class OpenTables:
     ----------
     name : str
         All files, for messages.
+    given : Columns
+        The format as given, before recognition.
     layout : Layout
         Common layout with the signals of all tables.
     """
 
     def __init__(self, paths: Sequence[Path], form: Columns) -> None:
+        self.given = form
         layouts = [layout_of(path, form, len(paths) > 1) for path in paths]
         self._layouts = dict(zip(paths, layouts, strict=True))
         self.name = ", ".join(map(str, self._layouts))
@@ -328,17 +334,35 @@ class OpenTables:
 
     def require_settled(self) -> None:
         """Raise ValueError, with all open questions in one line, if the files leave any."""
+        if self.layout.questions:
+            raise ValueError(self.asked(self.layout.questions))
+
+    def asked(self, questions: Sequence[str]) -> str:
+        """Return one line with the files and all questions."""
         layout = self.layout
-        if not layout.questions:
-            return
         is_lone = len(self._layouts) == 1 and len(layout.headers) < 2
         if is_lone and layout.raw.is_text and not layout.times:
             (only, *_) = (*layout.headers, "")
-            raise ValueError(
+            return (
                 f"{self.name}: only one column, {quoted(only)}: name the delimiter of the file "
                 "(--delimiter)"
             )
-        raise ValueError(f"{self.name}: cannot tell {'; '.join(layout.questions)}")
+        return f"{self.name}: cannot tell {'; '.join(questions)}"
+
+    def doubts(self, reads: Sequence[ReadSignal]) -> list[str]:
+        """Return questions after units of times and signals that the samples contradict."""
+        found: dict[str, None] = {}
+        for read in reads:
+            layout = self._layouts[read.signal.path]
+            form, stamps = layout.times[read.signal.time], read.stamps
+            if form.is_assumed and stamps.size and 0 < np.ptp(stamps) < _SHORTEST:
+                found[
+                    f"the unit of the time {quoted(layout.headers[read.signal.time[0]])}, which "
+                    f"rises by {np.ptp(stamps) / 1e9:g} in all (--time-unit s or --time-unit min)"
+                ] = None
+            if question := _unlikely_unit(read, self.given):
+                found[question] = None
+        return list(found)
 
     def clock_of(self, signal: TableSignal) -> str:
         """Return the header of the times of a signal."""
@@ -462,6 +486,33 @@ def require_good(read: ReadSignal, form: Columns) -> None:
         "use a stretch of the record without them, or allow more (--maximum-bad-share "
         f"{math.ceil(share * 100 + 0.5) / 100:g})"
     )
+
+
+_LARGEST_FRACTION, _LEAST_SPAN = 1.05, 0.05
+"""A share with such values and such a span is rather a fraction than a percentage. Chosen."""
+_LEAST_PRESSURE = 2e3
+"""Pressure, Pa, that a moving actuator exceeds. Chosen: 0.02 bar."""
+
+
+def _unlikely_unit(read: ReadSignal, given: Columns) -> str:
+    """Return the question after a unit that the header seems to state wrongly, or ''.
+
+    A unit in the `given` format is right.
+    """
+    unit, values, quantity = read.signal.unit, read.values, read.signal.quantity
+    if getattr(given, f"{quantity}_unit") or not values.size:
+        return ""
+    low, high = float(values.min()), float(values.max())
+    what = f"the unit of the {quantity} {quoted(read.signal.name)}, values from {low:g} to {high:g}"
+    if unit == PERCENT and low > -_LEAST_SPAN and low + _LEAST_SPAN < high < _LARGEST_FRACTION:
+        return f"{what} (--{quantity}-unit fraction or --{quantity}-unit percent)"
+    size = PRESSURE_UNITS.get(unit)
+    if size and max(abs(low), abs(high)) * size.multiplier / size.divisor < _LEAST_PRESSURE:
+        return (
+            f"{what}, in {unit} too little to move an actuator (--{quantity}-unit, or --decimal if "
+            "these are thousands)"
+        )
+    return ""
 
 
 def read_columns(path: Path, names: Sequence[str]) -> dict[str, NDArray[np.float64]]:

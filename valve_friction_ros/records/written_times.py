@@ -57,6 +57,8 @@ _CLOCK = (
 _STAMP = re.compile(rf"{_DATE}(?P<join>[Tt]|,?\s+){_CLOCK}")
 _DAY = re.compile(_DATE)
 _OF_DAY = re.compile(r"\d{1,2}:\d\d(?::\d\d)?(?:[.,]\d+)?\s*(?:[AaPp][Mm])?")
+_HALF = re.compile(r"[AaPp][Mm]$")
+_HOUR_NS, _DAY_NS = 3_600_000_000_000, 86_400_000_000_000
 _DURATION = re.compile(r"(?:\d+ days? )?\d{1,3}:\d\d:\d\d(?:[.,]\d+)?")
 
 
@@ -65,7 +67,14 @@ _REORDERED = re.compile(
 )
 """Formats with the parts of ISO 8601 in another order, if all have two digits."""
 
+MIDNIGHT = " 00:00:00"
+"""End of a day in a workbook, where it is a date with a time."""
+
 _HOURS_ONLY = re.compile(r":\d\d(?:\.\d+)?[+\-]\d\d$")
+
+
+_LEAST_SHORT_YEAR = 10
+"""Least year of two digits beside - or /. Chosen: no export is from before 2010."""
 
 
 def is_date(text: str) -> bool:
@@ -86,9 +95,11 @@ def is_time_of_day(text: str) -> bool:
 
 
 def in_one(parts: Sequence[str]) -> str:
-    """Join a date, a time of day and optional milliseconds."""
+    """Join a date, a time of day and milliseconds, of which one of the latter may be missing."""
     day, clock, *rest = (part.strip() for part in parts)
-    return f"{day} {clock}" + "".join(f".{one:0>3}" for one in rest)
+    if clock.isdigit():
+        return f"{day}.{clock:0>3}"
+    return f"{day.removesuffix(MIDNIGHT)} {clock}" + "".join(f".{one:0>3}" for one in rest)
 
 
 @dataclass(frozen=True)
@@ -103,6 +114,10 @@ class TimeForm:
         Zone of dates, unless each has its own (`has_zone`), and of numbers in days.
     unit, origin : str, int
         Unit of numbers, and their origin, ns since 1970.
+    last : str
+        Unit of the last part of a time of day with two parts, s or min.
+    is_assumed : bool
+        Whether the unit of numbers is neither given nor stated.
     """
 
     formats: tuple[str, ...] = ()
@@ -110,13 +125,16 @@ class TimeForm:
     unit: str = ""
     origin: int = 0
     has_zone: bool = False
+    last: str = "s"
+    is_assumed: bool = False
 
 
 class DateForms(NamedTuple):
-    """Possible formats of the dates in a column: with the day first, with the month first."""
+    """Possible formats of the dates in a column: with day, month or two-digit year first."""
 
     day_first: tuple[str, ...]
     month_first: tuple[str, ...]
+    year_first: tuple[str, ...]
     has_zone: bool
 
 
@@ -124,8 +142,9 @@ def date_forms(texts: Sequence[str]) -> DateForms | None:
     """Find the formats that fit all texts; None if a text is not a date with a time."""
     day: dict[str, None] = {}
     month: dict[str, None] = {}
+    year: dict[str, None] = {}
     has_zone = True
-    day_possible = month_possible = True
+    day_possible = month_possible = year_possible = True
     for raw in texts:
         text = _normal(raw)
         found = _STAMP.fullmatch(text)
@@ -134,19 +153,25 @@ def date_forms(texts: Sequence[str]) -> DateForms | None:
         has_zone &= found["zone"] is not None
         day[_format(found, "%d", "%m")] = None
         if found["first"] is None:
-            month_possible = False
+            month_possible = year_possible = False
             continue
         if found["s2"] == ".":
-            month_possible = False
+            month_possible = year_possible = False
+        elif len(found["year"]) == 2 and int(found["year"]) < _LEAST_SHORT_YEAR:
+            day_possible = month_possible = False
+        year_possible &= len(found["year"]) == 2 and 1 <= int(found["year"]) <= 31
+        year_possible &= int(found["first"]) >= _LEAST_SHORT_YEAR and int(found["second"]) <= 12
         day_possible &= int(found["second"]) <= 12
         month_possible &= int(found["first"]) <= 12
         is_american = found["half"] and found["s2"] == "/" and len(found["first"]) == 1
         if is_american and not found["second"].startswith("0") and len(found["second"]) == 1:
             day_possible = False  # 7/1/2026 2:00 PM; with the day first it would be 1/07
         month[_format(found, "%m", "%d")] = None
+        year[_format(found, "%y", "%m", "%d")] = None
     return DateForms(
         _with_and_without_fraction(day) if day_possible else (),
         _with_and_without_fraction(month) if month_possible else (),
+        _with_and_without_fraction(year) if year_possible else (),
         has_zone,
     )
 
@@ -159,14 +184,14 @@ def _with_and_without_fraction(forms: Iterable[str]) -> tuple[str, ...]:
     return tuple(known)
 
 
-def _format(found: re.Match[str], first: str, second: str) -> str:
-    """Return the strptime format of a recognized date."""
+def _format(found: re.Match[str], first: str, second: str, third: str = "") -> str:
+    """Return the strptime format of a recognized date; its third part is the year by default."""
     if found["iso"]:
         date = f"%Y{found['s1']}%m{found['s1']}%d"
     elif found["compact"]:
         date = "%Y%m%d"
     elif found["first"]:
-        year = "%Y" if len(found["year"]) == 4 else "%y"
+        year = third or ("%Y" if len(found["year"]) == 4 else "%y")
         date = f"{first}{found['s2']}{second}{found['s2']}{year}"
     elif found["american"]:
         date = "%b %d, %Y"
@@ -212,6 +237,7 @@ class WrittenTimes:
         self._form = form
         self._is_summer = True
         self._before = NO_TIME
+        self._days = 0
 
     def __call__(self, cells: "pd.Series[Any]", numbers: NDArray[np.float64]) -> NDArray[np.int64]:
         """Convert the cells of a block; `numbers` are the values of those that are numbers."""
@@ -241,9 +267,30 @@ class WrittenTimes:
         import pandas as pd  # noqa: PLC0415 - slow to import
 
         plain = texts.str.replace(",", ".", regex=False)
+        half = plain.str[-2:].str.casefold() if _HALF.search("".join(plain.iloc[:1])) else None
+        plain = plain if half is None else plain.str[:-2].str.strip()
         short = plain.str.count(":") == 1
-        plain = plain.where(~short, "00:" + plain) if short.any() else plain
-        return _ns(pd.TimedeltaIndex(pd.to_timedelta(plain, errors="coerce")))
+        if short.any():
+            is_minutes = self._form.last == "min" or half is not None
+            plain = plain.where(~short, plain + ":00" if is_minutes else "00:" + plain)
+        times = _ns(pd.TimedeltaIndex(pd.to_timedelta(plain, errors="coerce")))
+        if half is not None:
+            later = np.where((half == "pm").to_numpy(), _DAY_NS // 2, 0)
+            times = np.where(times == NO_TIME, NO_TIME, times % (_DAY_NS // 2) + later)
+        return self._over_midnight(times)
+
+    def _over_midnight(self, times: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Return times of day that continue after midnight."""
+        known = times != NO_TIME
+        if not known.any():
+            return times
+        own = times[known]
+        before = np.concatenate([own[:1] if self._before == NO_TIME else [self._before], own[:-1]])
+        days = self._days + np.cumsum((before - own > _DAY_NS - _HOUR_NS) & (before < _DAY_NS))
+        self._before, self._days = int(own[-1]), int(days[-1])
+        found = times.copy()
+        found[known] = own + days * _DAY_NS
+        return found
 
     def _dates(self, texts: "pd.Series[str]") -> "pd.DatetimeIndex":
         import pandas as pd  # noqa: PLC0415 - slow to import

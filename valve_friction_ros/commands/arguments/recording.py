@@ -13,7 +13,7 @@ import argparse
 import contextlib
 import math
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import fields, replace
 from pathlib import Path
 from types import MappingProxyType
@@ -179,6 +179,24 @@ def reading_progress() -> "Iterator[None]":
             yield
         finally:
             PROGRESS.reset(token)
+
+
+@contextlib.contextmanager
+def identifying_progress(count: int) -> "Iterator[Callable[[], None]]":
+    """Show on a terminal that recordings are being identified, and since when.
+
+    The given function counts one of them as done.
+    """
+    if not sys.stderr.isatty():
+        yield lambda: None
+        return
+    from rich.progress import BarColumn, TextColumn, TimeElapsedColumn  # noqa: PLC0415 - slow
+
+    from valve_friction_ros.commands.console import shown_progress  # noqa: PLC0415
+
+    with shown_progress(TextColumn("identifying"), BarColumn(), TimeElapsedColumn()) as progress:
+        task = progress.add_task("", total=count if count > 1 else None)
+        yield lambda: progress.advance(task)
 
 
 def _own_description(recording: Path) -> Path | None:
