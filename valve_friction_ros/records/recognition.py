@@ -45,8 +45,9 @@ from valve_friction_ros.records.written_times import (
 )
 
 _MOST_CHOICES, _MOST_TAGS = 6, 10_000
-_COARSE = 0.5
-"""Largest step of a time without a unit that is in seconds; others may be milliseconds. Chosen."""
+_COARSE, _COARSE_IF_NAMED = 0.5, 60.0
+"""Largest step of a time without a unit that is in seconds; the same of a column that is named in
+the format. Others may be milliseconds. Chosen: a sample per minute shows no motion."""
 _GOOD = re.compile(r"(good|ok|gut|valid|true|g|yes|ja|gültig)\b.*|\(?good\b.*", re.IGNORECASE)
 _DOUBT = re.compile("questionable|substituted|bad|invalid", re.IGNORECASE)
 _TRUE_OR_FALSE = re.compile("true|false|0|1", re.IGNORECASE)
@@ -195,8 +196,9 @@ class _Recognition(Look):
             return TimeForm(unit=given or column.said.unit, origin=self.origin)
         numbers = self._numbers(column)
         steps = [b - a for a, b in pairwise(numbers) if b != a]
-        if not steps or abs(median(steps)) <= _COARSE:
-            return TimeForm(unit="s", is_assumed=not self.form.time_column)
+        is_named = bool(self.form.time_column)
+        if not steps or abs(median(steps)) <= (_COARSE_IF_NAMED if is_named else _COARSE):
+            return TimeForm(unit="s", is_assumed=not is_named)
         self.questions.append(
             f"the unit of the time {quoted(column.name)}, which rises by {median(steps):g} "
             "(--time-unit s or --time-unit ms)"
