@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from records import TIGHT, assert_held
+from records import TIGHT, assert_held, simulated
 from scipy.signal import lfilter
 
 from valve_friction_ros.identification import (
@@ -309,6 +309,19 @@ def test_electro_mechanical_positioning_system():
         assert one.value == pytest.approx(published, rel=share), name
         assert abs(one.value - published) <= one.half_width, name
         assert getattr(estimate, name) == pytest.approx(published, rel=0.05), name
+
+
+@pytest.mark.parametrize(("rate", "period"), [(250, 5.0), (1000, 9.3)])
+def test_a_record_without_noise_does_not_doubt_the_model(rate, period):
+    """Less than a micrometre of misfit is more than its noise, but no reason for a doubt."""
+    time = np.arange(41 * rate) / rate
+    pressure = converter_response(SquareWave(period=period).sample(time), 1 / rate, 0.6)
+    record = simulated(pressure, 1 / rate)
+    result = identify_plant(record, BENCH_VALVE, IdentificationSettings())
+    assert 1e6 * result.misfit.systematic < 1.0
+    assert result.misfit.describes
+    truth = {"coulomb_friction": LOW_FRICTION.coulomb_friction}
+    assert_held(result.parameters, truth)
 
 
 @pytest.mark.skipif(

@@ -405,6 +405,8 @@ class _Search:
                 last, step = found[-1], 2.0 * step
             elif step > _LEAST_STEP:
                 step /= 4.0
+            else:
+                break
         return found
 
     def without_lag(self, best: PosteriorFit, at: Coordinates) -> PosteriorFit:

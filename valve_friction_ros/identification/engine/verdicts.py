@@ -277,7 +277,8 @@ _OF_SLIP = ("static_friction", "stribeck_velocity")
 noise of the sensor is not quite white."""
 
 _NOISE_SHARE, _LEAST = 0.2, 2e-4
-"""Shares of the stem's noise and of its range in the misfit that is tolerated on a bench.
+"""Shares of the stem's noise and of its range in the misfit that is tolerated on a bench; the
+latter also on a plant.
 
 Chosen: 70 of 71 simulated records of Karnopp valves stay within it."""
 
@@ -287,10 +288,11 @@ def fit_misfit(
 ) -> Misfit:
     """Return how well the simulated stem follows the measured one.
 
-    The model of a plant is doubted only where its misfit exceeds noise and the friction stays
-    uncertain: where the interval of the sliding friction is wider than twice `USABLE`. The model of
-    a bench is doubted where its misfit exceeds the effect of pressure noise on the simulated stem,
-    by the difference of both halves, plus small shares of the stem's noise and range.
+    The model of a plant is doubted only where its misfit exceeds noise and a small share of the
+    range, and the friction stays uncertain: where the interval of the sliding friction is wider
+    than twice `USABLE`. The model of a bench is doubted where its misfit exceeds the effect of
+    pressure noise on the simulated stem, by the difference of both halves, plus small shares of the
+    stem's noise and range.
     """
     record = fit.model.record
     rms = float(np.sqrt(np.mean(fit.residual**2)))
@@ -309,7 +311,8 @@ def fit_misfit(
     systematic = math.sqrt(max(rms**2 - noise, 0.0))
     sliding = numbers["sliding_friction"]
     certain = sliding.half_width <= 2.0 * USABLE * abs(sliding.value)
-    describes = certain or fit.inflation < NOISE_LIKE
+    small = systematic <= _LEAST * float(np.ptp(record.position))
+    describes = certain or small or fit.inflation < NOISE_LIKE
     return Misfit(fitted, rms, systematic, systematic if describes else 0.5 * systematic)
 
 
