@@ -89,6 +89,7 @@ class _Recognition(Look):
         super().__init__(raw, form)
         self.is_part = is_part
         self.unclear: dict[str, str] = {}
+        self.asked: set[str] = set()
         self.times: dict[tuple[int, ...], TimeForm] = {}
         self.good: dict[int, Callable[[str], bool]] = {}
         self.tag_place: int | None = None
@@ -112,8 +113,7 @@ class _Recognition(Look):
         if len(numeric) == 1 or (numeric and self._are_pairs(numeric)):
             return [(column.place,) for column in numeric]
         possible = [one for one in self.of_kind("number", "") if not one.said.unit]
-        self._ask_name("time", [one.name for one in numeric or possible])
-        self.questions[-1] += ", and its unit (--time-unit)"
+        self._ask_name("time", [one.name for one in numeric or possible], has_unit=False)
         return []
 
     def _split_times(self) -> list[tuple[int, ...]]:
@@ -309,14 +309,16 @@ class _Recognition(Look):
                 )
         return list(found)
 
-    def _ask_name(self, quantity: str, among: Sequence[str]) -> None:
+    def _ask_name(self, quantity: str, among: Sequence[str], has_unit: bool = True) -> None:
         listed = " or ".join(shlex.quote(name) for name in among[:_MOST_CHOICES])
         more = " …" if len(among) > _MOST_CHOICES else ""
         listed = f" {listed}{more}" if among else ""
         is_tag = self.tag_place is not None and quantity not in ("tag", "value")
         what = "tag" if is_tag else "column"
         what = f"which {what} is the {quantity}" + ("" if among else f", of {self.names}")
-        self.questions.append(f"{what} (--{quantity}-column{listed})")
+        unit = "" if has_unit else f", and its unit (--{quantity}-unit)"
+        self.questions.append(f"{what} (--{quantity}-column{listed}){unit}")
+        self.asked.add(quantity)
 
     def _signal(self, quantity: str, name: str, said: Named, place: int) -> TableSignal:
         unit = self._unit(quantity, name, said, place)
@@ -514,7 +516,6 @@ class _Recognition(Look):
         positions: Sequence[_Candidate],
         candidates: Sequence[_Candidate],
     ) -> None:
-        said = " ".join([*self.questions, *self.lacking])
         texts = [
             one.name
             for one in self.of_kind("text")
@@ -525,14 +526,12 @@ class _Recognition(Look):
             self._ask_name("tag", texts)
             return
         for quantity, found in ((drive, drives), ("position", positions)):
-            if len(found) == 1 or f"--{quantity}-column" in said:
-                if len(found) == 1:
-                    self._unit(quantity, *found[0])
-                continue
-            among = found or [each for each in candidates if each[1].quantity in _UNCLEAR]
-            self._ask_name(quantity, [name for name, _, _ in among])
-            if among and not any(said_.unit for _, said_, _ in among):
-                self.questions[-1] += f", and its unit (--{quantity}-unit)"
+            if len(found) == 1:
+                self._unit(quantity, *found[0])
+            elif quantity not in self.asked and f"--{quantity}-column" not in self.lacking:
+                among = found or [each for each in candidates if each[1].quantity in _UNCLEAR]
+                has_unit = not among or any(said.unit for _, said, _ in among)
+                self._ask_name(quantity, [name for name, _, _ in among], has_unit)
 
 
 def _may_be_si(quantity: str, numbers: Sequence[float]) -> bool:
