@@ -18,9 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from valve_friction_ros.identification.refusal import RefusalError
+from valve_friction_ros.identification.trust.uncertainty import MEDIAN_MAGNITUDE
 from valve_friction_ros.model.recording import StampedRecord, StampedSignal
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.signals import (
+    quantisation_step,
     runs_of,
     smooth_between,
     smoothing_leverage,
@@ -208,12 +210,25 @@ def _noise_on_grid(signal: StampedSignal, grid: NDArray[np.float64], noise: floa
     return noise * math.sqrt(float(np.sum(counts**2)) / grid.size)
 
 
+_OF_FOURTH = math.sqrt(70.0)
+"""Deviation of the fourth differences of white noise, over its own: 1, 4, 6, 4 and 1 squared."""
+
+
+def _roughness(values: NDArray[np.float64]) -> float:
+    """Return the deviation of white noise by fourth differences, including rounding.
+
+    They hold no curvature, which `stamped_noise` takes for noise where a signal has none.
+    """
+    white = float(np.median(np.abs(np.diff(values, 4)))) / (MEDIAN_MAGNITUDE * _OF_FOURTH)
+    return math.hypot(white, quantisation_step(values) / math.sqrt(12.0))
+
+
 def _smoothed(signal: StampedSignal, grid: NDArray[np.float64]) -> _Smoothed:
     """Smooth a signal between its corners."""
     period = float(grid[1] - grid[0])
     whole = np.interp(grid, signal.time, signal.value)
     noise = _noise_on_grid(signal, grid, stamped_noise(signal))
-    if noise < _NOISELESS * float(np.ptp(whole)):
+    if min(noise, _roughness(signal.value)) < _NOISELESS * float(np.ptp(whole)):
         return _Smoothed(whole, np.stack([whole, whole]), np.zeros(grid.size), 1)
     corners, window = smoothing_of(whole, noise, period)
     if window == 1:
@@ -381,17 +396,21 @@ def set_anew_at_rests(record: FittedRecord) -> FittedRecord:
 
     A resting stem has forgotten all but its position, so each move is independent: a single jump
     that is simulated at the wrong time then spoils no other. The price is the noise of that
-    position.
+    position. A stem that surely creeps does not rest.
     """
     positions = np.interp(
         np.arange(record.force.size) * record.period, record.time, record.position
     )
     anew = record.anew.copy()
     mean, margin = (max(round(time / record.period), 1) for time in (_REST_MEAN, _REST_MARGIN))
+    averaged = max(float(np.sum(record.samples)) * _REST_MEAN / record.duration, 1.0)
+    creeping = _SURELY * record.noise * math.sqrt(4.0 / averaged)
     for begin, end in runs_of(record.still):
         last = end - margin
         if last - mean > begin and last > 0:
-            anew[last] = float(np.mean(positions[last - mean : last]))
+            rest = positions[last - mean : last]
+            if abs(np.mean(rest[mean // 2 :]) - np.mean(rest[: mean // 2 + 1])) < creeping:
+                anew[last] = float(np.mean(rest))
     return replace(record, anew=anew)
 
 
