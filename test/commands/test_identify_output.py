@@ -296,8 +296,9 @@ class TestOptions:
         expected = printed(quick_csv, *bench_options, *BENCH, "--fix", "mass=1.6")
         assert column(found, "published") == column(expected, "published")
         assert column(found, "verdict") == column(expected, "verdict")
+        # The speed is that of the simulated stem, so it is as equal as the numbers are.
         assert known(found) == pytest.approx(known(expected), rel=1e-6)
-        assert found["sliding_speed"] == pytest.approx(expected["sliding_speed"], rel=1e-9)
+        assert found["sliding_speed"] == pytest.approx(expected["sliding_speed"], rel=1e-6)
         # The first survey is by the travel, which the valve file tells.
         assert [one in found for one in ("diagnosis", "findings")] == [False, False]
         # How a table of other headers was read is noted.
