@@ -152,6 +152,11 @@ def quantisation_step(signal: NDArray[np.float64]) -> float:
     return float(gaps[gaps > 1e-6 * gaps.max()].min())
 
 
+def rounding_noise(signal: NDArray[np.float64]) -> float:
+    """Estimate the deviation of a converter's rounding, 1/√12 of its step, in the signal's unit."""
+    return quantisation_step(signal) / math.sqrt(12.0)
+
+
 def sensor_noise(signal: NDArray[np.float64]) -> float:
     """Estimate the deviation of a sensor's noise including rounding, in the unit of `signal`.
 
@@ -159,7 +164,7 @@ def sensor_noise(signal: NDArray[np.float64]) -> float:
     hardly changes, and the error is not white where the signal drifts slowly. Therefore 1/√12 of
     the step is added in quadrature.
     """
-    return math.hypot(position_noise(signal), quantisation_step(signal) / math.sqrt(12.0))
+    return math.hypot(position_noise(signal), rounding_noise(signal))
 
 
 def velocity_noise(noise: float, sample_period: float, window: int, order: int) -> float:
@@ -193,7 +198,7 @@ def stamped_noise(signal: StampedSignal) -> float:
     distance = np.abs(value[1:-1] - line) / np.sqrt(1.0 + share**2 + (1.0 - share) ** 2)
     kept = max(int(_KEPT * distance.size), 1)
     white = float(np.mean(np.partition(distance, kept - 1)[:kept])) / _KEPT_MEAN
-    noise = math.hypot(white, quantisation_step(value) / math.sqrt(12.0))
+    noise = math.hypot(white, rounding_noise(value))
     _stamped_noises[signal] = noise
     return noise
 
@@ -470,7 +475,7 @@ class MeasuredRecord(Recording):
     @cached_property
     def position_noise(self) -> float:
         """Standard deviation of the noise of the position including rounding, m."""
-        return math.hypot(self.white_noise, quantisation_step(self.position) / math.sqrt(12.0))
+        return math.hypot(self.white_noise, rounding_noise(self.position))
 
     @cached_property
     def drive_noise(self) -> float:

@@ -372,8 +372,9 @@ class Look:
             column.kind = self._kind(column)
             columns.append(column)
         for day, clock in itertools.pairwise(columns):
-            if clock.kind == "clock" and all(one.endswith(MIDNIGHT) for one in day.filled):
-                day.kind = "day" if day.kind == "date" else day.kind
+            are_apart = (day.kind, clock.kind) == ("date", "clock")
+            if are_apart and all(one.endswith(MIDNIGHT) for one in day.filled):
+                day.kind = "day"
         self.unit_row = {
             column.name: known_unit(units[column.place])
             for column in columns

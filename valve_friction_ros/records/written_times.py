@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from valve_friction_ros.records.units import NANOSECONDS
+from valve_friction_ros.streams import DAY
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -58,7 +59,7 @@ _STAMP = re.compile(rf"{_DATE}(?P<join>[Tt]|,?\s+){_CLOCK}")
 _DAY = re.compile(_DATE)
 _OF_DAY = re.compile(r"\d{1,2}:\d\d(?::\d\d)?(?:[.,]\d+)?\s*(?:[AaPp][Mm])?")
 _HALF = re.compile(r"[AaPp][Mm]$")
-_HOUR_NS, _DAY_NS = 3_600_000_000_000, 86_400_000_000_000
+_HOUR = DAY // 24
 _DURATION = re.compile(r"(?:\d+ days? )?\d{1,3}:\d\d:\d\d(?:[.,]\d+)?")
 
 
@@ -275,8 +276,8 @@ class WrittenTimes:
             plain = plain.where(~short, plain + ":00" if is_minutes else "00:" + plain)
         times = _ns(pd.TimedeltaIndex(pd.to_timedelta(plain, errors="coerce")))
         if half is not None:
-            later = np.where((half == "pm").to_numpy(), _DAY_NS // 2, 0)
-            times = np.where(times == NO_TIME, NO_TIME, times % (_DAY_NS // 2) + later)
+            later = np.where((half == "pm").to_numpy(), DAY // 2, 0)
+            times = np.where(times == NO_TIME, NO_TIME, times % (DAY // 2) + later)
         return self._over_midnight(times)
 
     def _over_midnight(self, times: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -286,10 +287,10 @@ class WrittenTimes:
             return times
         own = times[known]
         before = np.concatenate([own[:1] if self._before == NO_TIME else [self._before], own[:-1]])
-        days = self._days + np.cumsum((before - own > _DAY_NS - _HOUR_NS) & (before < _DAY_NS))
+        days = self._days + np.cumsum((before - own > DAY - _HOUR) & (before < DAY))
         self._before, self._days = int(own[-1]), int(days[-1])
         found = times.copy()
-        found[known] = own + days * _DAY_NS
+        found[known] = own + days * DAY
         return found
 
     def _dates(self, texts: "pd.Series[str]") -> "pd.DatetimeIndex":

@@ -22,7 +22,7 @@ from valve_friction_ros.identification.trust.uncertainty import MEDIAN_MAGNITUDE
 from valve_friction_ros.model.recording import StampedRecord, StampedSignal
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.signals import (
-    quantisation_step,
+    rounding_noise,
     runs_of,
     smooth_between,
     smoothing_leverage,
@@ -220,7 +220,7 @@ def _roughness(values: NDArray[np.float64]) -> float:
     They hold no curvature, which `stamped_noise` takes for noise where a signal has none.
     """
     white = float(np.median(np.abs(np.diff(values, 4)))) / (MEDIAN_MAGNITUDE * _OF_FOURTH)
-    return math.hypot(white, quantisation_step(values) / math.sqrt(12.0))
+    return math.hypot(white, rounding_noise(values))
 
 
 def _smoothed(signal: StampedSignal, grid: NDArray[np.float64]) -> _Smoothed:
