@@ -159,21 +159,27 @@ def test_a_page_is_sent_with_its_first_rows_and_the_others_follow(plant):
 
 def test_a_table_reads_a_status_again_only_where_its_mark_has_changed():
     name, level, tag, message, values = values_of_valve(0)
-    plant, reads = Plant(5.0), []
+    plant, reads, looks = Plant(5.0), [], []
 
     def tell(mark, beat):
         def read():
             reads.append(beat)
             return Status(name, level, tag, message, {**values, "reversals": str(beat)})
 
-        plant.hear(Unread(name, read, lambda: mark), 0.0)
+        def look():
+            looks.append(mark)
+            return mark
+
+        plant.hear(Unread(name, read, look), 0.0)
 
     node = name.partition(":")[0]
     for beat, mark in enumerate((7, 7, 7, 8)):
         tell(mark, beat)
-        (heard,) = plant.valves(0.0)
+        for _ in range(3):  # of three open pages
+            (heard,) = plant.valves(0.0)
         assert not heard.view.values
     assert reads == [0, 3]
+    assert looks == [7, 7, 7, 8]
     tell(8, 4)
     (heard,) = plant.valves(0.0)
     whole = plant.valve(node, 0.0)

@@ -9,6 +9,7 @@
 
 """The live state of a plant's valves, read from their statuses for the pages."""
 
+import contextlib
 import itertools
 import math
 import re
@@ -532,32 +533,40 @@ class _Valve:
         self.view = view
         self._mark: object = None
         self._essence: tuple[object, ...] = ()
+        self._looked: Unread | None = None
+        self._whole = view
         self._read: Unread | None = None
 
-    def look(self, node: str, with_values: bool) -> None:
-        """Read the latest status; without its values if nothing else can have changed.
+    def look(self, node: str) -> None:
+        """Read what a table shows from the latest status; an invalid status changes nothing.
 
-        An invalid status changes nothing.
+        Each status is looked at once, however many pages are open.
         """
         latest = self.latest
-        if latest is None or latest is self._read:
+        if latest is None or latest is self._looked:
             return
         try:
             mark = None if latest.mark is None else latest.mark()
-            if mark is not None and mark == self._mark and not with_values:
-                return
-            status = latest.read()
+            if mark is None or mark != self._mark:
+                status = latest.read()
+                # Parameters change only with the time of the estimate.
+                essence = (*status[1:4], *map(status.values.get, ESSENTIAL_KEYS))
+                if essence != self._essence:
+                    self.view, self._essence = replace(view_of(node, status), values={}), essence
+                    self.revision += 1
         except ValueError:
-            self.latest = None
+            self.latest = self._looked
             return
-        self._mark = mark
-        # Parameters change only with the time of the estimate.
-        essence = (*status[1:4], *map(status.values.get, ESSENTIAL_KEYS))
-        if essence != self._essence:
-            self.view, self._essence = view_of(node, status), essence
-            self.revision += 1
-        self._read = latest if with_values else None
-        self.view = replace(self.view, values=status.values if with_values else {})
+        self._mark, self._looked = mark, latest
+
+    def whole(self, node: str) -> ValveView:
+        """Return the view with all values; the same object until the next status."""
+        self.look(node)
+        if self.latest is not None and self.latest is not self._read:
+            with contextlib.suppress(ValueError):
+                self._whole = replace(self.view, values=self.latest.read().values)
+            self._read = self.latest
+        return self._whole
 
 
 class Plant:
@@ -625,16 +634,18 @@ class Plant:
         """
         with self._lock:
             self._tidy(now)
-            return [self._heard(node, valve, now, False) for node, valve in self._valves.items()]
+            return [self._heard(node, valve, now) for node, valve in self._valves.items()]
 
     def valve(self, node: str, now: float) -> Heard | None:
         """Return the valve of an identifier, if it is known."""
         with self._lock:
-            valve = self._valves.get(node)
-            return None if valve is None else self._heard(node, valve, now, True)
+            if (valve := self._valves.get(node)) is None:
+                return None
+            view = valve.whole(node)
+            return replace(self._heard(node, valve, now), view=view)
 
-    def _heard(self, node: str, valve: _Valve, now: float, with_values: bool) -> Heard:
-        valve.look(node, with_values)
+    def _heard(self, node: str, valve: _Valve, now: float) -> Heard:
+        valve.look(node)
         age = None if valve.at is None else max(0.0, now - valve.at)
         silent = age is None or age > self._silence
         return Heard(valve.number, valve.view, age, silent, valve.revision)
