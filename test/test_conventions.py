@@ -209,6 +209,18 @@ def test_a_public_type_has_a_name_of_its_own():
     assert not {name: paths for name, paths in types.items() if len(paths) > 1}
 
 
+def test_no_function_is_longer_than_a_screen():
+    most = 80
+    long = [
+        f"{path.name}: {node.name} has {size} lines"
+        for path in Path(vf.__file__).resolve().parent.rglob("*.py")
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
+        and (size := (node.end_lineno or 0) - node.lineno + 1) > most
+    ]
+    assert not long
+
+
 def test_the_types_of_the_page_are_there():
     named = re.findall(r"^\| `([A-Z]\w+)` \|", PAGE, re.MULTILINE)
     assert len(named) > 8

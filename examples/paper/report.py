@@ -306,21 +306,7 @@ def _sections(programme: Programme, pictures: Pictures) -> list[tuple[str, tuple
                 *(pictures[f"figure_{n}_{name}"] for name in paper.PACKINGS for n in (3, 4)),
             ),
         ),
-        (
-            "Table 1",
-            (
-                *(parameter_table(one) for one in (low, high)),
-                _mass_by_bias(programme),
-                Paragraph(
-                    "Model 1 is the sweep, model 2 the force balance. The method bench fits a "
-                    "simulated stem to the measured one; it finds F_0 in place of x̄ and takes the "
-                    f"nominal mass of {bench.assumed_mass:g} kg. A parameter that "
-                    "the record does not determine is shown as not identifiable, without a number; "
-                    f"for such a mass the models take {bench.assumed_mass:g} kg. F_0 of the truth "
-                    "is k·x̄ with the paper's x̄ of 1.13 mm."
-                ),
-            ),
-        ),
+        ("Table 1", _parameters(programme)),
         ("Contribution of each term (Fig. 5)", (pictures["figure_5"],)),
         ("Validation (Figs. 6 to 9)", _validation(programme, pictures)),
         (
@@ -337,6 +323,23 @@ def _sections(programme: Programme, pictures: Pictures) -> list[tuple[str, tuple
         ("Effect of noise", _noise(programme)),
         ("Graphite packing, slip jump (section 6)", _graphite(programme, pictures)),
     ]
+
+
+def _parameters(programme: Programme) -> tuple[Block, ...]:
+    results = [programme.results[name] for name in paper.PACKINGS]
+    mass = results[0].bench.assumed_mass
+    return (
+        *map(parameter_table, results),
+        _mass_by_bias(programme),
+        Paragraph(
+            "Model 1 is the sweep, model 2 the force balance. The method bench fits a "
+            "simulated stem to the measured one; it finds F_0 in place of x̄ and takes the "
+            f"nominal mass of {mass:g} kg. A parameter that "
+            "the record does not determine is shown as not identifiable, without a number; "
+            f"for such a mass the models take {mass:g} kg. F_0 of the truth "
+            "is k·x̄ with the paper's x̄ of 1.13 mm."
+        ),
+    )
 
 
 def _mass_by_bias(programme: Programme) -> Paragraph:

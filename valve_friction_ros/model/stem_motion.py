@@ -313,9 +313,8 @@ def advance_stem(
                 return position, velocity
             if tangent is not None:
                 way = upward if side > 0 else downward
-                pull = max(
-                    side * (force + slope * elapsed - spring * position), way.static_friction
-                )
+                pull = side * (force + slope * elapsed - spring * position)
+                pull = max(pull, way.static_friction)
                 cause = WAITED if wait > 0.0 else TURNS if has_stopped else LET_GO
                 falls = way.stribeck_velocity > 0.0
                 held = way.static_friction if falls else way.coulomb_friction
@@ -325,14 +324,9 @@ def advance_stem(
             side = 1.0 if velocity > 0 else -1.0
         way = upward if side > 0 else downward
         stop = _stop_ahead(side, upward.travel)
+        drive, left = side * (force + slope * elapsed), duration - elapsed
         reached, speed, time, chord = _slide_one_way(
-            side * position,
-            abs(velocity),
-            way,
-            side * (force + slope * elapsed),
-            side * slope,
-            duration - elapsed,
-            stop,
+            side * position, abs(velocity), way, drive, side * slope, left, stop
         )
         if tangent is not None:
             has_stopped = speed == 0.0
@@ -340,20 +334,10 @@ def advance_stem(
             pull = side * (force + slope * elapsed - spring * position)
             if velocity == 0.0:
                 pull = max(pull, way.static_friction)
+            at, rate = side * position, side * slope
             carry_slide(
                 tangent,
-                Phase(
-                    side,
-                    elapsed,
-                    time,
-                    side * position,
-                    abs(velocity),
-                    pull,
-                    side * slope,
-                    way,
-                    chord,
-                    end,
-                ),
+                Phase(side, elapsed, time, at, abs(velocity), pull, rate, way, chord, end),
             )
         position, velocity = side * reached, side * speed
         elapsed += max(time, shortest_phase)

@@ -473,35 +473,24 @@ def run_stem(
             sample = _rest_on(
                 sample, at, forces, grip, anew, upward, downward, positions, velocities
             )
-        elif is_quick and falls:
-            ladder = steps_up if velocity > 0 else steps_down
-            sample = _slide_on_falling(
-                sample, side, way, ladder, forces, grip, anew, positions, velocities
-            )
-        elif is_quick:
-            slide = up if velocity > 0 else down
-            sample = _slide_on(sample, side, way, slide, forces, grip, anew, positions, velocities)
-        if velocity == 0.0:
             keep(tangent, first, sample)
         elif falls:
             ladder = steps_up if velocity > 0 else steps_down
+            if is_quick:
+                sample = _slide_on_falling(
+                    sample, side, way, ladder, forces, grip, anew, positions, velocities
+                )
             _carry_falling(
                 tangent, first, sample, side, way, ladder, forces, grip, positions, velocities
             )
         else:
-            slide = up if velocity > 0 else down
+            step = up if velocity > 0 else down
+            if is_quick:
+                sample = _slide_on(
+                    sample, side, way, step, forces, grip, anew, positions, velocities
+                )
             _carry(
-                tangent,
-                first,
-                sample,
-                side,
-                way,
-                slide,
-                forces,
-                grip,
-                positions,
-                velocities,
-                period,
+                tangent, first, sample, side, way, step, forces, grip, positions, velocities, period
             )
         if sample == forces.size - 1:
             return stepped

@@ -372,23 +372,16 @@ def plan_test(
     limits, conditions = limits or Limits(), conditions or Conditions()
     settings = settings or IdentificationSettings()
     found = _Search(valve, frictions, limits, conditions, settings, aim)
-    told = progress or (lambda _: None)
-    test = found.test(found.best(told))
+    say = progress or (lambda _: None)
+    test = found.test(found.best(say))
     assert test is not None  # noqa: S101 - it was simulated
     forecasts: list[Forecast] = []
     for place in range(len(frictions.draws)):
         forecasts.append(found.forecast(test, place, is_final=True))
-        told(0.9 + 0.1 * len(forecasts) / len(frictions.draws))
+        say(0.9 + 0.1 * len(forecasts) / len(frictions.draws))
+    tried = len({pattern for pattern, _ in found.known})
     plan = StrokePlan(
-        test,
-        valve,
-        found.band,
-        frictions,
-        tuple(forecasts),
-        limits,
-        conditions,
-        aim,
-        len({pattern for pattern, _ in found.known}),
+        test, valve, found.band, frictions, tuple(forecasts), limits, conditions, aim, tried
     )
     if plan.likely.refusal:
         raise RefusalError(
