@@ -12,7 +12,6 @@
 import argparse
 import json
 import os
-import statistics
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
@@ -31,7 +30,6 @@ from benchmark.bounds import (
     coverage_bounds,
     default_bounds,
     diagnosed,
-    emps_bounds,
     information_table,
 )
 from benchmark.cases import (
@@ -57,7 +55,6 @@ from valve_friction_ros.identification import DEFAULT_METHOD
 
 _FIRST_COVERAGE_SEED = 10_000
 _FIRST_GROWN_SEED = 20_000
-_TIMED_RUNS = 5
 
 
 @dataclass
@@ -73,8 +70,6 @@ class Results:
     bounds: list[Bound] = field(default_factory=list)
     # best accuracy that any method could reach on the square wave
     information: list[Information] = field(default_factory=list)
-    # median time of one identification, by valve and method
-    seconds: dict[str, float] = field(default_factory=dict)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -98,16 +93,6 @@ def _seeds_of(case: Case, options: argparse.Namespace) -> int:
     if is_main and case.plant.is_karnopp and case.noise in ("28.6 µm", "60 µm"):
         return int(options.seeds)
     return int(options.other_seeds)
-
-
-def _timing(results: Results, _: argparse.Namespace, __: Console) -> None:
-    for name in PLANTS:
-        case = Case(name, "square", "28.6 µm", "1 kHz")
-        case.record(0)
-        for method in (DEFAULT_METHOD, "bench"):
-            results.seconds[f"{name}, {method}"] = statistics.median(
-                run(case, seed, method).seconds for seed in range(_TIMED_RUNS)
-            )
 
 
 def _coverage(results: Results, options: argparse.Namespace, _: Console) -> None:
@@ -162,14 +147,6 @@ def _cases(results: Results, options: argparse.Namespace, console: Console) -> N
     console.print(cases_table(results.outcomes))
 
 
-def _emps(results: Results, _: argparse.Namespace, console: Console) -> None:
-    bounds = emps_bounds()
-    if bounds is None:
-        console.print("EMPS is skipped: its record is not here")
-    else:
-        results.bounds += bounds
-
-
 def _information(results: Results, _: argparse.Namespace, console: Console) -> None:
     results.information = [
         information(name, noise)
@@ -182,8 +159,6 @@ def _information(results: Results, _: argparse.Namespace, console: Console) -> N
 
 
 _RUNS: Mapping[str, Callable[[Results, argparse.Namespace, Console], None]] = {
-    "timing": _timing,
-    "emps": _emps,
     "coverage": _coverage,
     "default": _default,
     "alarms": _alarms,
@@ -205,8 +180,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if name in options.parts:
             part(results, options, console)
     console.print(bounds_table(filter(_is_worth_a_line, results.bounds)))
-    for name, seconds in results.seconds.items():
-        console.print(f"{name}: {seconds:.2f} s to identify 52 s at 1 kHz")
     options.output.with_suffix(".json").write_text(
         json.dumps(asdict(results), indent=1, ensure_ascii=False), encoding="utf-8"
     )

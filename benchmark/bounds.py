@@ -15,7 +15,6 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 from rich.table import Table
@@ -33,55 +32,18 @@ from benchmark.cases import (
 from benchmark.harness.rows import Bound
 from valve_friction_ros.health import Baseline, FrictionLimits, diagnose
 from valve_friction_ros.identification import (
-    IdentificationSettings,
     RefusalError,
     Result,
     Verdict,
-    identify,
     identify_bench,
 )
 from valve_friction_ros.model import (
     BENCH_VALVE,
     LOW_FRICTION,
-    Drive,
     Recording,
     SensorNoise,
-    Valve,
     simulate,
 )
-
-RECORD = (
-    Path(__file__).resolve().parents[2] / "shared" / "data" / "emps" / "emps_identification.csv"
-)
-
-PUBLISHED = {
-    "mass": 95.1089,
-    "viscous_friction": 203.5034,
-    "coulomb_friction": 20.3935,
-    "spring_preload": -3.1648,
-}
-"""IDIM-LS values by the authors of the data set."""
-
-
-def emps_bounds() -> list[Bound] | None:
-    """Identify EMPS with default settings and no spring; return None without its record."""
-    if not RECORD.is_file():
-        return None
-    time, force, position = np.loadtxt(RECORD, delimiter=",", skiprows=1, unpack=True)
-    record = Recording(float(np.median(np.diff(time))), force, position, driven_by=Drive.FORCE)
-    settings = IdentificationSettings(fixed={"spring_constant": 0.0})
-    result = identify(record, Valve(), settings)
-    bounds = []
-    for name, published in PUBLISHED.items():
-        one = result.parameters[name]
-        error = one.value / published - 1
-        inside = abs(one.value - published) <= one.half_width
-        shown = one.verdict is not Verdict.NOT_IDENTIFIABLE
-        what = f"EMPS: {name} within 2 % of {published:g}, or inside its interval"
-        reached = f"{one.value:.4g} ± {one.half_width:.2g}, {error:+.1%}, {one.verdict.value}"
-        bounds.append(Bound(what, reached, shown and (abs(error) <= 0.02 or inside)))
-    return bounds
-
 
 GROWTH = 1.5
 """Friction of the valve with tightened packing, over that of the unchanged valve."""

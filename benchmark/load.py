@@ -31,7 +31,7 @@ from playwright.sync_api import Browser, BrowserContext, Error, Page, sync_playw
 from rclpy.serialization import serialize_message
 
 from benchmark.harness.processes import Process, free_port, module, parameters, running
-from benchmark.harness.rows import Row, at_most, judged, none, opened_console, rows_table, under
+from benchmark.harness.rows import Row, at_most, judged, opened_console, rows_table, under
 from benchmark.harness.run import Participant, own_folder, quiet_domain
 from benchmark.load_plant import identifier_of, ratio_of, tag_of
 from valve_friction_ros.health import (
@@ -168,19 +168,14 @@ class Stage:
         self.dashboard = self._node("dashboard", "", **known)
         self.dashboard.wait_for("ready: open")
 
-    def plant(self, rate: float, *more: str) -> Process:
-        """Start the simulated valves, and wait until they publish."""
-        given = ("--valves", str(self.valves), "--rate", str(rate), *more)
-        made = self._start("benchmark.load_plant", str(self._template), *given)
-        made.wait_for("publishing")
-        return made
-
     @contextlib.contextmanager
-    def shown(self, rate: float, *more: str) -> Iterator[Process]:
+    def shown(self, rate: float, *more: str) -> Iterator[None]:
         """Provide a plant shown by the dashboard."""
-        with self.plant(rate, *more) as plant:
+        given = ("--valves", str(self.valves), "--rate", str(rate), *more)
+        with self._start("benchmark.load_plant", str(self._template), *given) as plant:
+            plant.wait_for("publishing")
             self.show()
-            yield plant
+            yield
         self.dashboard.end()
 
     def prepare(self) -> None:
@@ -496,11 +491,7 @@ def bound_rows(
     yield from _healed(stage, launch, repeats)
 
 
-_PARTS = ("bounds", "afternoon", "pictures")
-_WIDTHS = {390: 844, 1280: 800, 2560: 1440}
-_THEMES = ("light", "dark")
-_SIGNALS = 20_000
-"""Time for the signals of a valve to fill their charts, ms."""
+_PARTS = ("bounds", "afternoon", "picture")
 _SETTLE = 2500
 """Time for a page to finish drawing, ms."""
 
@@ -519,43 +510,12 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _take_manual_picture(stage: Stage, browser: Browser, path: Path) -> None:
-    stage.say("the picture of the manual")
     with browser.new_context(viewport={"width": 1400, "height": 700}) as context:
         page = context.new_page()
         page.goto(f"{stage.address}/?theme=light")
         wait_on_page(page, "document.querySelector('.vf-row')")
         page.wait_for_timeout(_SETTLE)
         page.screenshot(path=path)
-
-
-def _picture_rows(stage: Stage, browser: Browser, folder: Path) -> Iterator[Row]:
-    """Take pictures of all pages for inspection; count pages wider than their window."""
-    folder.mkdir(parents=True, exist_ok=True)
-    live, other = quote(LIVE), quote(identifier_of(2))
-    pages = {
-        "plant": "/?",
-        "tiles": "/?view=tiles",
-        "nothing": "/?q=xyzzy",
-        "valve": f"/valve?node={live}",
-        "grown": f"/valve?node={other}",
-        "unknown": f"/valve?node={quote('/area_9/no_such_valve/identifier')}",
-        "compare": f"/compare?a={live}&b={other}",
-    }
-    wide, taken = 0, 0
-    for name, path in pages.items():
-        stage.say(f"picture of {name}")
-        settle = _SIGNALS if name == "valve" else _SETTLE
-        for theme, (width, height) in itertools.product(_THEMES, _WIDTHS.items()):
-            with browser.new_context(viewport={"width": width, "height": height}) as context:
-                page = context.new_page()
-                page.goto(f"{stage.address}{path}&theme={theme}")
-                wait_on_page(page, "window.did_handshake")
-                page.wait_for_timeout(settle)
-                wide += page.evaluate("document.documentElement.scrollWidth > innerWidth")
-                page.screenshot(path=folder / f"{name}_{width}_{theme}.png", full_page=True)
-            settle, taken = _SETTLE, taken + 1
-    yield Row("pictures taken", taken)
-    yield none("pages wider than their window", wide)
 
 
 def _measured(options: argparse.Namespace, stage: Stage) -> Iterator[tuple[str, list[Row]]]:
@@ -569,14 +529,9 @@ def _measured(options: argparse.Namespace, stage: Stage) -> Iterator[tuple[str, 
             with stage.shown(options.rate):
                 use = afternoon_rows(stage, launch(), options.minutes, options.seed)
                 yield "afternoon", list(use)
-        if "pictures" in options.parts:
-            browser = launch()
-            with stage.shown(1.0, "--still") as plain:
-                _take_manual_picture(stage, browser, stage.folder / "dashboard.png")
-                plain.end()
-                stage.plant(1.0, "--still", "--awkward")
-                pictures = _picture_rows(stage, browser, stage.folder / "pictures")
-                yield "pictures", list(pictures)
+        if "picture" in options.parts:
+            with stage.shown(1.0, "--still"):
+                _take_manual_picture(stage, launch(), stage.folder / "dashboard.png")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

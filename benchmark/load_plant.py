@@ -19,7 +19,7 @@ import random
 import signal
 import sys
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from copy import deepcopy
 from datetime import datetime, timezone
 from pathlib import Path
@@ -48,14 +48,6 @@ _KINDS = (
     (0, "", math.nan, "no baseline: call ~/set_baseline on the healthy valve"),
 )
 """Level, letter of NE 107, ratio (nan without a baseline) and first words of the diagnosis."""
-_AWKWARD = {
-    2: "A long tag with many words that somebody once typed into the settings of this valve",
-    4: f"NO-SPACE-{'X' * 70}",
-    7: "Überströmventil №5 – 工場の弁",
-    8: '<b>"bold"</b> & so on',
-    11: "V",
-}
-"""Tags that are difficult to draw."""
 _SCALED = ("coulomb_friction", "sliding_friction", "dead_band", "static_friction")
 
 
@@ -139,7 +131,6 @@ def _publish(
     template: DiagnosticStatus,
     count: int,
     rate: float,
-    tags: Mapping[int, str],
     every: int,
 ) -> Iterator[None]:
     """Publish; if `every` is the number of valves, identify the next valve at each beat."""
@@ -149,9 +140,6 @@ def _publish(
         for index in range(count)
     ]
     known = [[status_of(template, index, beat) for beat in range(_BEATS)] for index in range(count)]
-    for index, tag in tags.items():
-        for status in known[index] if index < count else ():
-            status.hardware_id = tag
     arrays = [[_diagnostics(status) for status in beats] for beats in known]
     latched = [[serialize_message(status) for status in beats] for beats in known]
     del known
@@ -173,16 +161,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--valves", type=int, default=500)
     parser.add_argument("--rate", type=float, default=1.0, help="Hz")
     parser.add_argument("--still", action="store_true", help="no valve is identified anew")
-    parser.add_argument("--awkward", action="store_true", help="some tags are hard to draw")
     options = parser.parse_args(arguments)
     stopped: list[int] = []
     signal.signal(signal.SIGTERM, lambda number, _: stopped.append(number))
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     node = rclpy.create_node("plant", enable_rosout=False, start_parameter_services=False)
     template = deserialize_message(options.template.read_bytes(), DiagnosticStatus)
-    tags = _AWKWARD if options.awkward else {}
     every = sys.maxsize if options.still else options.valves
-    for _ in _publish(node, template, options.valves, options.rate, tags, every):
+    for _ in _publish(node, template, options.valves, options.rate, every):
         if stopped:
             break
     node.destroy_node()

@@ -27,7 +27,7 @@ from benchmark.harness.rows import in_parallel, new_file
 from benchmark.reality.motions import Kind
 from benchmark.reality.records import Case
 from benchmark.reality.report import bounds, report
-from benchmark.reality.trial import Row, Task, real_rows, rows_of, tried
+from benchmark.reality.trial import Row, Task, tried
 
 _PROCESSES = 2
 _PARTS = ("plain", "stickslip", "alarms")
@@ -52,12 +52,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--limit", type=float, default=60.0, metavar="S", help="processor time for one record"
     )
-    parser.add_argument("--save", type=Path, metavar="FOLDER", help="keep the records as .npz")
-    parser.add_argument(
-        "--real", type=Path, metavar="FOLDER", help="holds the folders cylinders and emps"
-    )
     parser.add_argument("--out", type=new_file, default=Path("reality.jsonl"), help="the rows")
-    parser.add_argument("--read", action="store_true", help="show the rows of --out; run nothing")
     return parser
 
 
@@ -71,15 +66,13 @@ def _tasks(options: argparse.Namespace, entropy: int) -> Iterator[Task]:
             for motion in motions:
                 if part in options.only and motion in some:
                     case = Case(entropy + place, motion, number, **special)
-                    yield Task(part, case, options.limit, options.save)
+                    yield Task(part, case, options.limit)
 
 
 def _run(options: argparse.Namespace, console: Console) -> list[Row]:
     """Run all tasks, and write each row as it arrives."""
     entropy = secrets.randbits(32) if options.entropy is None else options.entropy
     console.print(f"--entropy {entropy}")
-    if options.save is not None:
-        options.save.mkdir(parents=True, exist_ok=True)
     with options.out.open("w", encoding="utf-8") as file:
 
         def write(rows: Iterable[Row]) -> None:
@@ -94,15 +87,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the requested parts; return 1 if a bound is missed."""
     options = _parser().parse_args(arguments)
     console = Console(soft_wrap=True, highlight=False, markup=False)
-    rows = rows_of(options.out) if options.read else _run(options, console)
+    rows = _run(options, console)
     motions = [kind.value for kind in Kind]
     rows.sort(key=lambda row: (_PARTS.index(row.part), motions.index(row.motion)))
-    real = [] if options.real is None else list(real_rows(options.real))
-    for line in report(rows, real):
+    for line in report(rows):
         console.print(line)
-    if not real:
-        console.print("\nReal machines: not measured; --real FOLDER names where they are.")
-    return 0 if all(one.met for one in bounds(rows, real)) else 1
+    return 0 if all(one.met for one in bounds(rows)) else 1
 
 
 if __name__ == "__main__":

@@ -16,23 +16,20 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
 import numpy as np
 
 from benchmark.reality.records import Nominal, Record
-from valve_friction_ros import read_recording
 from valve_friction_ros.health import Baseline, FrictionLimits, Level, StatusSignal, diagnose_valve
 from valve_friction_ros.health.measured import Measured
 from valve_friction_ros.health.standstill import held_finding, held_numbers
 from valve_friction_ros.identification import (
-    DEFAULT_METHOD,
     IdentificationSettings,
     RefusalError,
     Result,
-    method_named,
+    identify_plant,
 )
 from valve_friction_ros.identification.engine import method as engine
 from valve_friction_ros.identification.engine.intervals import estimated
@@ -120,10 +117,16 @@ def _seen_fits() -> Iterator[list[PosteriorFit]]:
         yield seen
 
 
-def _answer(recording: Recording, valve: Valve, has_spring: bool, method: str) -> Answer:
+def identify(record: Record) -> Answer:
+    """Identify a record like a node, through the buffer and with unchanged stamps."""
+    try:
+        recording = _recording(record)
+    except RefusalError as refusal:
+        return Answer(refusal=str(refusal))
+    valve = _valve(record.nominal)
     with _seen_fits() as fits:
         try:
-            result = method_named(method)(recording, valve, _settings(has_spring))
+            result = identify_plant(recording, valve, _settings(record.nominal.has_spring))
         except RefusalError as refusal:
             is_still = isinstance(refusal, LittleMotionError)
             held = held_numbers(recording, valve) if is_still else {}
@@ -133,26 +136,6 @@ def _answer(recording: Recording, valve: Valve, has_spring: bool, method: str) -
         for name, one in result.parameters.items()
     }
     return Answer(numbers, "", tuple(result.warnings), result, tuple(fits))
-
-
-def identify(record: Record, method: str = DEFAULT_METHOD) -> Answer:
-    """Identify a record like a node, through the buffer and with unchanged stamps."""
-    try:
-        recording = _recording(record)
-    except RefusalError as refusal:
-        return Answer(refusal=str(refusal))
-    nominal = record.nominal
-    return _answer(recording, _valve(nominal), nominal.has_spring, method)
-
-
-def identify_file(path: Path, method: str = DEFAULT_METHOD) -> Answer:
-    """Identify a file of a force-driven machine without a spring."""
-    valve = Valve()
-    try:
-        recording = read_recording(path, valve)
-    except RefusalError as refusal:
-        return Answer(refusal=str(refusal))
-    return _answer(recording, valve, False, method)
 
 
 def is_baseline(answer: Answer) -> bool:

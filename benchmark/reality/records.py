@@ -10,12 +10,10 @@
 
 """Records of random valves, and the truth about them."""
 
-import json
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -325,12 +323,3 @@ def make_record(case: Case) -> Record:
             "force_lag": body.volume_lag - instruments.pressure.lag,
         },
     )
-
-
-def save(record: Record, path: Path) -> None:
-    """Write a record: ``<signal>_stamps`` (ns), ``<signal>`` (SI), and the rest as JSON."""
-    parts, arrays = asdict(record), {}
-    for name in ("pressure", "position"):
-        signal = parts.pop(name)
-        arrays |= {f"{name}_stamps": signal.stamps, name: signal.values}
-    np.savez_compressed(path, about=json.dumps(parts), **arrays)

@@ -17,7 +17,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 from benchmark.harness.rows import Bound
-from benchmark.reality.trial import CHANGES, SLIDING, RealRow, Row
+from benchmark.reality.trial import CHANGES, SLIDING, Row
 
 _WIDEST_ERROR, _LEAST_ERROR = 3.0, 0.02
 """An identified number is wrong if its error exceeds both this many half widths and this share."""
@@ -45,9 +45,6 @@ _SLOWEST = 2.0
 
 _DECLARED = {1.5: 0.85, 2.0: 0.98, 0.45: 0.85}
 """Required share of plants on which a change of friction by this factor is declared."""
-
-_CYLINDERS = 50 / 59
-"""Required share of real cylinders with correct sliding friction."""
 
 _VERDICTS = ("identified", "weak")
 
@@ -302,7 +299,7 @@ def _bounds_of_alarms(rows: _Rows) -> Iterator[Bound]:
     yield _least("a baseline", lambda row: row.has_baseline, same, 0.95)
 
 
-def bounds(rows: _Rows, real: Sequence[RealRow] = ()) -> Iterator[Bound]:
+def bounds(rows: _Rows) -> Iterator[Bound]:
     """Yield the requirements of all parts that were run, with the figures reached."""
     numbers = judged(rows)
     yield _none("identified and wrong", sum(one.wrong for one in numbers))
@@ -331,11 +328,6 @@ def bounds(rows: _Rows, real: Sequence[RealRow] = ()) -> Iterator[Bound]:
         longer = _count(lambda row: row.seconds > _SLOWEST, rows)
         yield _none(f"records above {_SLOWEST:g} s", longer)
         yield _none("failures", _count(lambda row: row.failure, rows))
-    for machine, least in (("cylinders", _CYLINDERS), ("EMPS", 1.0)):
-        if own := [one for one in real if (one.machine == "EMPS") == (machine == "EMPS")]:
-            met = sum(one.met for one in own)
-            what = f"{machine}, near and narrow: at least {least:.0%}"
-            yield Bound(what, _share(met, len(own)), met >= least * len(own))
 
 
 def _missed(rows: _Rows) -> Iterator[str]:
@@ -356,7 +348,7 @@ def _missed(rows: _Rows) -> Iterator[str]:
         yield f"- refused {count} times: {words} …"
 
 
-def report(rows: _Rows, real: Sequence[RealRow] = ()) -> Iterator[str]:
+def report(rows: _Rows) -> Iterator[str]:
     """Yield the lines of the report in Markdown."""
     whole = [row for row in rows if row.part != "alarms"]
     if plain := [row for row in rows if row.part == "plain"]:
@@ -372,14 +364,8 @@ def report(rows: _Rows, real: Sequence[RealRow] = ()) -> Iterator[str]:
         declared = (f"×{change:g} declared" for change in CHANGES[1:])
         watched = ("alarms", "baseline", "unchanged: alarms", *declared)
         yield from _by_motion(alarms, watched, _alarms)
-    if real:
-        machines = (
-            (*one[:2], f"{one.known:.4g}", f"{one.value:.4g}", f"{one.half_width:.2g}", one.words)
-            for one in real
-        )
-        yield from _table(("machine", "number", "known", "found", "±", ""), machines)
     yield ""
     yield from _missed(rows)
     marks = {True: "met", False: "**missed**"}
-    reached = [(one.what, one.reached, marks[one.met]) for one in bounds(rows, real)]
+    reached = [(one.what, one.reached, marks[one.met]) for one in bounds(rows)]
     yield from _table(("bound", "reached", ""), reached)

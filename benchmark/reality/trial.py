@@ -17,7 +17,6 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from functools import partial
-from pathlib import Path
 from typing import NamedTuple, TypeVar
 
 import numpy as np
@@ -26,60 +25,7 @@ from scipy.signal import savgol_filter
 from benchmark.reality import package
 from benchmark.reality.motions import Kind
 from benchmark.reality.package import Answer, Number
-from benchmark.reality.records import Case, Record, TrueValue, make_record, save
-
-EMPS = {"coulomb_friction": 20.3935, "viscous_friction": 203.5034}
-"""IDIM-LS values by the authors of the data set: N, and N·s/m."""
-
-_NEAR, _NARROW = 0.10, 0.10
-_NEAR_EMPS = 0.03
-"""Largest error and half width of a cylinder's sliding friction, and largest error for EMPS, as
-shares."""
-
-
-class RealRow(NamedTuple):
-    """A number of a real machine and its published value, SI unit.
-
-    `words` is the verdict or the refusal. `met` is whether error and half width are small enough.
-    """
-
-    machine: str
-    name: str
-    known: float
-    value: float
-    half_width: float
-    words: str
-    met: bool
-
-
-def _real_row(
-    machine: str, name: str, known: float, answer: package.Answer, near: float, narrow: float
-) -> RealRow:
-    number = answer.numbers.get(name)
-    if number is None:
-        return RealRow(machine, name, known, math.nan, math.nan, answer.refusal[:60], False)
-    met = abs(number.value - known) <= near * known and number.half_width <= narrow * known
-    return RealRow(machine, name, known, number.value, number.half_width, number.verdict, met)
-
-
-def real_rows(folder: Path) -> Iterator[RealRow]:
-    """Identify the records in the folders ``cylinders`` and ``emps``, if present.
-
-    ``half_loops.json`` gives, for each cylinder, half the difference, N, between the forces in both
-    directions.
-    """
-    known = folder / "cylinders" / "half_loops.json"
-    if known.is_file():
-        for machine, loop in json.loads(known.read_text(encoding="utf-8")).items():
-            answer = package.identify_file(known.parent / f"{machine}.csv.gz")
-            half = loop["half_loop_n"]
-            yield _real_row(machine, "sliding_friction", half, answer, _NEAR, _NARROW)
-    emps = folder / "emps" / "emps_identification.csv"
-    if emps.is_file():
-        answer = package.identify_file(emps)
-        for name, value in EMPS.items():
-            yield _real_row("EMPS", name, value, answer, _NEAR_EMPS, math.inf)
-
+from benchmark.reality.records import Case, Record, TrueValue, make_record
 
 _WINDOW = 0.15
 _SURELY = 0.2
@@ -162,29 +108,15 @@ class Row:
         return json.dumps(asdict(self), ensure_ascii=False, default=np.generic.item)
 
 
-def rows_of(path: Path) -> list[Row]:
-    """Read a file of rows."""
-    rows = []
-    for line in path.read_text(encoding="utf-8").splitlines():
-        parts = json.loads(line)
-        parts["truth"] = {name: TrueValue(**one) for name, one in parts["truth"].items()}
-        parts["numbers"] = {name: Number(**one) for name, one in parts["numbers"].items()}
-        for name in ("imperfections", "warnings"):
-            parts[name] = tuple(parts[name])
-        rows.append(Row(**parts))
-    return rows
-
-
 class Task(NamedTuple):
     """All records of one valve, of which `case` is the first.
 
-    `limit` is the processor time per identification, s. `folder` is where to save the records.
+    `limit` is the processor time per identification, s.
     """
 
     part: str
     case: Case
     limit: float
-    folder: Path | None = None
 
 
 @contextmanager
@@ -239,13 +171,6 @@ def _row(task: Task, case: Case, record: Record) -> tuple[Row, Answer]:
     return row, answer
 
 
-def _made(task: Task, case: Case) -> Record:
-    record = make_record(case)
-    if task.folder is not None:
-        save(record, task.folder / f"{task.part} {case.name}.npz".replace(" ", "_"))
-    return record
-
-
 _warm = False
 
 
@@ -263,7 +188,7 @@ def tried(task: Task) -> list[Row]:
     _warm_up()
     case = task.case
     try:
-        record = _made(task, case)
+        record = make_record(case)
     except ValueError as error:
         return [Row(task.part, case.name, case.motion.value, failure=str(error))]
     row, answer = _row(task, case, record)
@@ -274,7 +199,7 @@ def tried(task: Task) -> list[Row]:
     rows = []
     for again, change in enumerate(CHANGES, start=1):
         other = case._replace(again=again, change=change)
-        row, later = _row(task, other, _made(task, other))
+        row, later = _row(task, other, make_record(other))
         alarms, failure, _ = _within(task.limit, partial(package.alarms, later, answer))
         rows.append(
             replace(
