@@ -18,6 +18,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmark.reality import plants as reality
 from valve_friction_ros.identification import (
     IdentificationSettings,
     RefusalError,
@@ -42,72 +43,7 @@ from valve_friction_ros.model import (
     converter_response,
     simulate,
 )
-from valve_friction_ros.model.compiled import compiled
 from valve_friction_ros.model.excitations import pressure_at
-
-BRISTLE_STIFFNESS = 942.4 / 20e-6
-"""σ_0 of the LuGre valve, N/m: the stem creeps 20 µm before breakaway."""
-
-_SUBSTEPS = 100
-
-
-def _lugre(plant: "Plant", pressure: NDArray[np.float64], period: float) -> NDArray[np.float64]:
-    p = plant.parameters
-    forces = plant.valve.actuator_force(pressure) - p.spring_preload
-    bristle_damping = float(np.sqrt(BRISTLE_STIFFNESS * p.mass))
-    return _step_lugre(
-        forces,
-        period / _SUBSTEPS,
-        p.mass,
-        p.spring_constant,
-        p.coulomb_friction,
-        p.static_friction,
-        p.stribeck_velocity,
-        p.viscous_friction,
-        BRISTLE_STIFFNESS,
-        bristle_damping,
-        plant.valve.travel,
-    )
-
-
-@compiled
-def _step_lugre(
-    forces: NDArray[np.float64],
-    step: float,
-    mass: float,
-    spring: float,
-    coulomb: float,
-    static: float,
-    stribeck: float,
-    viscous: float,
-    stiffness: float,
-    damping: float,
-    travel: float,
-) -> NDArray[np.float64]:
-    """Step LuGre friction, ż = v − σ_0·|v|/g(v)·z, linearly implicitly (Canudas de Wit, 1995).
-
-    Impact on a travel stop is perfectly inelastic.
-    """
-    positions = np.empty_like(forces)
-    position, velocity, bristle = min(max(forces[0] / spring, 0.0), travel), 0.0, 0.0
-    positions[0] = position
-    for sample in range(1, forces.size):
-        before, change = forces[sample - 1], forces[sample] - forces[sample - 1]
-        for substep in range(1, _SUBSTEPS + 1):
-            force = before + change * substep / _SUBSTEPS
-            level = coulomb + (static - coulomb) * np.exp(-((velocity / stribeck) ** 2))
-            side = 1.0 if velocity >= 0 else -1.0
-            grip = 1.0 - side * stiffness * bristle / level
-            resisting = viscous + damping * grip + step * (spring + stiffness * grip)
-            pull = force - spring * position - stiffness * bristle
-            velocity = (mass * velocity + step * pull) / (mass + step * resisting)
-            position += step * velocity
-            rate = stiffness * abs(velocity) / level
-            bristle = (bristle + step * velocity) / (1.0 + step * rate)
-            if position < 0.0 or position > travel:
-                position, velocity = min(max(position, 0.0), travel), 0.0
-        positions[sample] = position
-    return positions
 
 
 @dataclass(frozen=True)
@@ -122,8 +58,33 @@ class Plant:
     def respond(self, pressure: NDArray[np.float64], period: float) -> NDArray[np.float64]:
         """Return the stem position, m, under `pressure`, Pa, sampled every `period`, s."""
         if self.has_bristles:
-            return _lugre(self, pressure, period)
+            return _with_bristles(self, pressure, period)
         return simulate(self.valve, self.parameters, pressure, period).position
+
+
+def _with_bristles(
+    plant: Plant, pressure: NDArray[np.float64], period: float
+) -> NDArray[np.float64]:
+    """Move the valve with a LuGre packing that creeps 20 µm before breakaway."""
+    valve, known = plant.valve, plant.parameters
+    forces = (known.coulomb_friction, known.static_friction, known.viscous_friction)
+    friction = reality.Friction(
+        *forces, known.stribeck_velocity, law=reality.Law.LUGRE, presliding=20e-6
+    )
+    body = reality.Body(
+        known.mass,
+        known.spring_constant,
+        known.spring_preload,
+        valve.diaphragm_area,
+        valve.pressure_reference,
+        valve.travel,
+    )
+    times = np.arange(pressure.size) * period
+    fine = np.interp(np.arange(0.0, times[-1] + reality.GRID, reality.GRID), times, pressure)
+    # The pressure follows its command within one step.
+    loop = reality.open_loop(0.0, 1.0, reality.STEPS[reality.Law.LUGRE])
+    moved = reality.move(reality.Plant(body, friction), loop, fine, np.zeros(fine.size), 0.0)
+    return moved.position[:: round(period / reality.GRID)][: pressure.size]
 
 
 _FALLING = replace(GRAPHITE_PACKING, stribeck_velocity=3.26e-3)
