@@ -14,22 +14,19 @@ import json
 import os
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict
 from functools import partial
+from itertools import product
 from pathlib import Path
 
 from rich.console import Console
 
 from benchmark.bounds import (
-    GROWTH,
-    AlarmCounts,
-    alarm_bounds,
     by_case,
     case_bounds,
     cases_table,
     coverage_bounds,
     default_bounds,
-    diagnosed,
     information_table,
 )
 from benchmark.cases import (
@@ -54,22 +51,10 @@ from benchmark.harness.rows import (
 from valve_friction_ros.identification import DEFAULT_METHOD
 
 _FIRST_COVERAGE_SEED = 10_000
-_FIRST_GROWN_SEED = 20_000
+_KARNOPP = [name for name, plant in PLANTS.items() if plant.is_karnopp]
 
-
-@dataclass
-class Results:
-    """Results of all parts of the benchmark."""
-
-    # outcomes of the cases and of the coverage records by the method ``bench``, and of the main
-    # noise at 1 kHz by the default method
-    outcomes: list[Outcome] = field(default_factory=list)
-    coverage: list[Outcome] = field(default_factory=list)
-    default: list[Outcome] = field(default_factory=list)
-    alarms: AlarmCounts | None = None
-    bounds: list[Bound] = field(default_factory=list)
-    # best accuracy that any method could reach on the square wave
-    information: list[Information] = field(default_factory=list)
+_Found = tuple[Sequence[Outcome | Information], list[Bound]]
+"""What a part has measured, and its requirements with the figures reached."""
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -79,8 +64,6 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--seeds", type=int, default=20, help="records of the square wave")
     parser.add_argument("--other-seeds", type=int, default=3, help="records of all other cases")
     parser.add_argument("--coverage", type=int, default=200, help="records for the coverage")
-    parser.add_argument("--alarms", type=int, default=1000, help="identifications for the alarms")
-    parser.add_argument("--grown", type=int, default=100, help="pairs of a valve that has grown")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="processes")
     parser.add_argument("--output", type=new_file, default=Path("accuracy"), help="of the JSON")
     return parser
@@ -95,73 +78,56 @@ def _seeds_of(case: Case, options: argparse.Namespace) -> int:
     return int(options.other_seeds)
 
 
-def _coverage(results: Results, options: argparse.Namespace, _: Console) -> None:
-    plants = [name for name, plant in PLANTS.items() if plant.is_karnopp]
+def _judged_by_case(
+    outcomes: Sequence[Outcome], bounds_of: Callable[[Sequence[Outcome]], list[Bound]]
+) -> _Found:
+    groups = by_case(outcomes).values()
+    return outcomes, [bound for group in groups for bound in bounds_of(group)]
+
+
+def _coverage(options: argparse.Namespace, _: Console) -> _Found:
+    """Identify the main noise at 1 kHz by `bench`, often enough to count its intervals."""
     tasks = [
         (Case(name, "square", "28.6 µm", "1 kHz"), _FIRST_COVERAGE_SEED + seed)
-        for name in plants
+        for name in _KARNOPP
         for seed in range(options.coverage)
     ]
-    results.coverage = in_parallel("coverage", run, tasks, options.jobs)
-    for group in by_case(results.coverage).values():
-        results.bounds += coverage_bounds(group)
+    return _judged_by_case(in_parallel("coverage", run, tasks, options.jobs), coverage_bounds)
 
 
-def _default(results: Results, options: argparse.Namespace, console: Console) -> None:
+def _default(options: argparse.Namespace, console: Console) -> _Found:
+    """Identify the main noise at 1 kHz by the default method."""
     tasks = [
         (Case(plant, excitation, "28.6 µm", "1 kHz"), seed)
-        for plant in PLANTS
-        for excitation in EXCITATIONS
+        for plant, excitation in product(PLANTS, EXCITATIONS)
         for seed in range(options.other_seeds)
     ]
     work = partial(run, method=DEFAULT_METHOD)
-    results.default = in_parallel("default", work, tasks, options.jobs)
-    for group in by_case(results.default).values():
-        results.bounds += default_bounds(group)
-    console.print(cases_table(results.default))
+    outcomes = in_parallel("default", work, tasks, options.jobs)
+    console.print(cases_table(outcomes))
+    return _judged_by_case(outcomes, default_bounds)
 
 
-def _alarms(results: Results, options: argparse.Namespace, _: Console) -> None:
-    unchanged = [(1.0, seed) for seed in range(options.alarms)]
-    grown = [(GROWTH, _FIRST_GROWN_SEED + seed) for seed in range(2 * options.grown)]
-    found = in_parallel("alarms", diagnosed, [*unchanged, *grown], options.jobs)
-    sides, ratios = ([one[column] for one in found] for column in (0, 1))
-    count = len(unchanged)
-    declared = ["high" in sides[i : i + 2] for i in range(count, len(sides), 2)]
-    results.alarms = AlarmCounts(sides[:count], declared, (ratios[:count], ratios[count:]))
-    results.bounds += alarm_bounds(results.alarms)
-
-
-def _cases(results: Results, options: argparse.Namespace, console: Console) -> None:
-    cases = [
-        Case(plant, excitation, noise, condition)
-        for plant in PLANTS
-        for excitation in EXCITATIONS
-        for noise in NOISES
-        for condition in CONDITIONS
-    ]
+def _cases(options: argparse.Namespace, console: Console) -> _Found:
+    """Identify all combinations of plant, excitation, noise and sampling by `bench`."""
+    cases = [Case(*names) for names in product(PLANTS, EXCITATIONS, NOISES, CONDITIONS)]
     tasks = [(case, seed) for case in cases for seed in range(_seeds_of(case, options))]
-    results.outcomes = in_parallel("cases", run, tasks, options.jobs)
-    for group in by_case(results.outcomes).values():
-        results.bounds += case_bounds(group)
-    console.print(cases_table(results.outcomes))
+    outcomes = in_parallel("cases", run, tasks, options.jobs)
+    console.print(cases_table(outcomes))
+    return _judged_by_case(outcomes, case_bounds)
 
 
-def _information(results: Results, _: argparse.Namespace, console: Console) -> None:
-    results.information = [
-        information(name, noise)
-        for name, plant in PLANTS.items()
-        if plant.is_karnopp
-        for noise in NOISES
-        if noise != "clean"
-    ]
-    console.print(information_table(results.information))
+def _information(_: argparse.Namespace, console: Console) -> _Found:
+    """Compute the best accuracy that any method could reach on the square wave."""
+    noises = [noise for noise in NOISES if noise != "clean"]
+    found = [information(name, noise) for name, noise in product(_KARNOPP, noises)]
+    console.print(information_table(found))
+    return found, []
 
 
-_RUNS: Mapping[str, Callable[[Results, argparse.Namespace, Console], None]] = {
+_RUNS: Mapping[str, Callable[[argparse.Namespace, Console], _Found]] = {
     "coverage": _coverage,
     "default": _default,
-    "alarms": _alarms,
     "cases": _cases,
     "information": _information,
 }
@@ -174,16 +140,20 @@ def _is_worth_a_line(bound: Bound) -> bool:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the requested parts; return 1 if a bound is missed."""
-    options = _parser().parse_args(arguments)
-    console, results = opened_console(), Results()
+    options, console = _parser().parse_args(arguments), opened_console()
+    bounds: list[Bound] = []
+    content: dict[str, list[dict[str, object]]] = {}
     for name, part in _RUNS.items():
         if name in options.parts:
-            part(results, options, console)
-    console.print(bounds_table(filter(_is_worth_a_line, results.bounds)))
+            found, of_part = part(options, console)
+            content[name] = list(map(asdict, found))
+            bounds += of_part
+    content["bounds"] = list(map(asdict, bounds))
+    console.print(bounds_table(filter(_is_worth_a_line, bounds)))
     options.output.with_suffix(".json").write_text(
-        json.dumps(asdict(results), indent=1, ensure_ascii=False), encoding="utf-8"
+        json.dumps(content, indent=1, ensure_ascii=False), encoding="utf-8"
     )
-    return judged(results.bounds, console)
+    return judged(bounds, console)
 
 
 if __name__ == "__main__":

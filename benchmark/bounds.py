@@ -13,89 +13,21 @@
 import statistics
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from functools import cache
+from dataclasses import replace
 
 import numpy as np
 from rich.table import Table
 
 from benchmark.cases import (
-    NOISES,
-    PERIOD,
-    SETTINGS,
     Case,
     Information,
     Outcome,
-    clean_record,
     wrong_claims,
 )
 from benchmark.harness.rows import Bound
-from valve_friction_ros.health import Baseline, FrictionLimits, diagnose
 from valve_friction_ros.identification import (
-    RefusalError,
-    Result,
     Verdict,
-    identify_bench,
 )
-from valve_friction_ros.model import (
-    BENCH_VALVE,
-    LOW_FRICTION,
-    Recording,
-    SensorNoise,
-    simulate,
-)
-
-GROWTH = 1.5
-"""Friction of the valve with tightened packing, over that of the unchanged valve."""
-
-_BASELINE_SEED = 1_000_000
-
-
-@dataclass(frozen=True)
-class AlarmCounts:
-    """Alarms and ratios of the two valves."""
-
-    unchanged: list[str]  # alarm of each identification of the unchanged valve
-    declared: list[bool]  # whether growth was declared, for each pair of identifications
-    ratios: tuple[list[float], list[float]]  # friction over the baseline, for each valve
-
-
-@cache
-def _clean(growth: float) -> Recording:
-    pressure = clean_record("low", "square").pressure
-    friction = growth * LOW_FRICTION.coulomb_friction
-    valve = replace(LOW_FRICTION, coulomb_friction=friction, static_friction=friction)
-    return Recording(PERIOD, pressure, simulate(BENCH_VALVE, valve, pressure, PERIOD).position)
-
-
-def _identified(growth: float, seed: int) -> Result:
-    noise = NOISES["28.6 µm"]
-    recording = SensorNoise(noise.position, noise.pressure, seed).applied_to(_clean(growth))
-    return identify_bench(recording, BENCH_VALVE, SETTINGS)
-
-
-@cache
-def _baseline() -> Baseline:
-    return Baseline.of(_identified(1.0, _BASELINE_SEED))
-
-
-def diagnosed(growth: float, seed: int) -> tuple[str, float]:
-    """Identify a valve with grown friction, and compare it with the unchanged valve.
-
-    Return "high" or "low" for an alarm, else an empty text, and the friction over the baseline; nan
-    if no friction was identified.
-    """
-    limits = FrictionLimits()
-    try:
-        ratio = diagnose(_identified(growth, seed), BENCH_VALVE, _baseline(), limits).ratio
-    except RefusalError:
-        ratio = None
-    if ratio is None:
-        return "", float("nan")
-    if ratio.low >= limits.warn_ratio:
-        return "high", ratio.value
-    return "low" if ratio.high <= limits.low_ratio else "", ratio.value
-
 
 COVERAGE = (0.90, 0.99)
 """Required range of the share of records whose 95 % interval covers the truth."""
@@ -108,8 +40,6 @@ _SQUARE = {
     "spring_constant": 0.001,
     "static_friction": 0.02,
 }
-_MOST_FALSE_ALARMS = 0.01
-_LEAST_DECLARED = 0.99
 
 
 def by_case(outcomes: Sequence[Outcome]) -> dict[Case, list[Outcome]]:
@@ -225,22 +155,6 @@ def coverage_bounds(outcomes: Sequence[Outcome]) -> list[Bound]:
         what = f"{case.plant_name}: 95 % interval of {name} covers 90 to 99 % of records"
         met = COVERAGE[0] <= share <= COVERAGE[1]
         bounds.append(Bound(what, f"{share:.1%} of {answers}", met))
-    return bounds
-
-
-def alarm_bounds(counts: AlarmCounts) -> list[Bound]:
-    """Check false alarms on both sides, and the detection of grown friction."""
-    identifications, pairs = len(counts.unchanged), len(counts.declared)
-    bounds = []
-    for side in ("high", "low"):
-        alarms = counts.unchanged.count(side)
-        met = alarms <= _MOST_FALSE_ALARMS * identifications
-        what = f"unchanged valve: {side} alarms in at most 1 %"
-        bounds.append(Bound(what, f"{alarms} of {identifications}", met))
-    declared = sum(counts.declared)
-    what = "friction grown to 1.5 ×: declared within two identifications in 99 %"
-    met = declared >= _LEAST_DECLARED * pairs
-    bounds.append(Bound(what, f"{declared} of {pairs}", met))
     return bounds
 
 
