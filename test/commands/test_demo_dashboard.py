@@ -43,7 +43,7 @@ def demo(request, ros_environment, tmp_path):
     environment.pop("PYTEST_CURRENT_TEST", None)  # NiceGUI behaves otherwise within a test
     with log.open("w") as stream:
         process = subprocess.Popen(
-            [*request.param, sys.executable, HERE / "quick_plant.py", "demo", "--dashboard"],
+            [*request.param, sys.executable, HERE / "quick_demo.py", "demo", "--dashboard"],
             stdout=stream,
             stderr=subprocess.STDOUT,
             cwd=tmp_path,

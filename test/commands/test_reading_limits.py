@@ -11,7 +11,6 @@
 
 import csv
 import gzip
-import json
 import resource
 import subprocess
 import sys
@@ -149,28 +148,6 @@ class TestValveFiles:
         message = refusal(quick_csv, "--valve", path)
         assert cause in message
         assert len(message) < 700
-
-
-class TestEstimates:
-    @pytest.mark.parametrize(
-        ("text", "cause"),
-        [
-            ("[" * 200_000, "not JSON"),
-            ('{"a":' * 200_000, "not JSON"),
-            ('{"parameters": ' + json.dumps({"m" * 100_000: 1}) + "}", "unknown parameter"),
-            (
-                '{"parameters": {"mass": {"value": 1' + "0" * 5000 + "}}}",
-                "a number or null, got inf",
-            ),
-            (" " * 20_000_000, "more than 10 MB"),
-        ],
-    )
-    def test_one_line(self, refused, quick_csv, bench_options, tmp_path, text, cause):
-        path = tmp_path / "estimate.json"
-        path.write_text(text)
-        message = refused("validate", quick_csv, *bench_options, "--estimate", path)
-        assert cause in message
-        assert len(message) < 500
 
 
 TAG = "=1+1 cost $\\foo{$ \x1b[2J\x07"

@@ -174,13 +174,18 @@ class TestRefusals:
         ("content", "cause"),
         [
             ("{", "not JSON"),
-            ("[" * 100_000, "not JSON: it is nested too deeply"),
+            ("[" * 200_000, "not JSON: it is nested too deeply"),
+            ('{"a":' * 200_000, "not JSON: it is nested too deeply"),
+            (" " * 20_000_000, "more than 10 MB"),
             ("[]", "contains no parameters: give a file written by `valve_friction identify --js"),
             ('{"valves": {}}', "contains several valves: identify one of them with --valve-name"),
             ('{"parameters": {"mass": 1}}', "parameters.mass has no value"),
             ('{"parameters": {"mass": {"value": "1"}}}', "must be a number or null, got '1'"),
+            ('{"parameters": {"mass": {"value": 1' + "0" * 5000 + "}}}", "or null, got inf"),
             ('{"parameters": {"weight": {"value": 1}}}', "unknown parameter 'weight'"),
+            ('{"parameters": {"' + "m" * 100_000 + '": 1}}', "unknown parameter 'mmm"),
         ],
+        ids=lambda text: text[:20],
     )
     def test_what_is_no_estimate(self, refused, tmp_path, other_csv, bench_options, content, cause):
         path = tmp_path / "bad.json"
@@ -188,6 +193,7 @@ class TestRefusals:
         message = refused(other_csv, *bench_options, "--estimate", path)
         assert f"{path}: " in message
         assert cause in message
+        assert len(message) < 500
 
     def test_no_file(self, refused, tmp_path, other_csv, bench_options, estimate):
         path = tmp_path / "none"

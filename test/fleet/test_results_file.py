@@ -294,10 +294,6 @@ def test_a_valve_with_a_finding_comes_before_a_normal_one():
     assert lines[0][-1].endswith("WARN: the spring constant has changed")
 
 
-def test_the_order():
-    assert [one["recording"] for one in ranked(FLEET)] == ORDER
-
-
 @pytest.mark.parametrize(
     ("given", "word"),
     [

@@ -326,17 +326,12 @@ class TestColumns:
         np.testing.assert_allclose(record.position, POSITION, rtol=1e-12)
         np.testing.assert_allclose(record.pressure, PRESSURE, rtol=1e-12)
 
-    def test_missing_under_its_other_name(self, write):
-        message = refused(write([HEADER, *GOOD]), form=Columns(time_column="t"))
-        assert message == (
-            "cannot tell which column is 't' (--time-column), as the valve file or an option names "
-            "it; columns: time_s, position_m, pressure_pa"
-        )
-
     def test_all_that_the_valve_file_names_and_the_file_lacks(self, write):
         form = Columns(time_column="Zeit", position_column="Hub", pressure_column="pressure_pa")
-        message = refused(write([HEADER, *GOOD]), form=form)
-        assert "'Zeit' (--time-column), 'Hub' (--position-column), as the valve file" in message
+        assert refused(write([HEADER, *GOOD]), form=form) == (
+            "cannot tell which column is 'Zeit' (--time-column), 'Hub' (--position-column), as the "
+            "valve file or an option names it; columns: time_s, position_m, pressure_pa"
+        )
 
     def test_twice(self, write):
         path = write(["time_s,position_m,pressure_pa,position_m", *(row + ",0" for row in GOOD)])
