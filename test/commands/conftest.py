@@ -9,10 +9,8 @@
 
 """Recorded files of the bench valve, and the description of that valve."""
 
-import contextlib
 import json
 import os
-import socket
 from functools import partial
 from pathlib import Path
 
@@ -144,24 +142,16 @@ def columns_of():
 
 @pytest.fixture
 def ros_environment(tmp_path):
-    """Environment of a ROS domain that no other test uses, here or in another run.
+    """Environment of a ROS domain that no other test uses, here or in another run."""
+    from valve_friction_ros.commands.demo.bench import free_domain
 
-    An abstract socket of the domain's number is held as long as the domain is in use.
-    """
-    with contextlib.ExitStack() as stack:
-        for number in range(92, 101):
-            claim = stack.enter_context(socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM))
-            with contextlib.suppress(OSError):
-                claim.bind(f"\0valve_friction_ros/domain/{number}")
-                break
-        else:
-            raise RuntimeError("all domains are in use")
-        inherited = {
-            name: value
-            for name, value in os.environ.items()
-            if name not in {"ROS_AUTOMATIC_DISCOVERY_RANGE", "FASTRTPS_DEFAULT_PROFILES_FILE"}
-        }
-        path = os.pathsep.join(filter(None, [str(PROJECT), os.environ.get("PYTHONPATH")]))
+    inherited = {
+        name: value
+        for name, value in os.environ.items()
+        if name not in {"ROS_AUTOMATIC_DISCOVERY_RANGE", "FASTRTPS_DEFAULT_PROFILES_FILE"}
+    }
+    path = os.pathsep.join(filter(None, [str(PROJECT), os.environ.get("PYTHONPATH")]))
+    with free_domain() as number:
         yield inherited | {
             "ROS_DOMAIN_ID": str(number),
             "ROS_LOG_DIR": str(tmp_path),
