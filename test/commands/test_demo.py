@@ -21,6 +21,7 @@ import time
 from pathlib import Path
 
 import pytest
+from processes import ran
 from rich.console import Console
 from waiting import wait_until
 
@@ -313,18 +314,12 @@ def test_interrupted(request_to_end, ros_environment, tmp_path):
 def test_the_whole_story(ros_environment, tmp_path):
     """Three nodes over DDS: identified, tightened while running, identified again, diagnosed."""
     output = tmp_path / "demo.png"
-    done = subprocess.run(
-        [sys.executable, Path(__file__).with_name("quick_demo.py"), "demo", "--output", output],
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=False,
-        cwd=tmp_path,
-        env=ros_environment | {"COLUMNS": "200"},
-    )
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert "Traceback" not in done.stderr
-    words = " ".join(done.stdout.split())
+    script, surroundings = Path(__file__).with_name("quick_demo.py"), {"COLUMNS": "200"}
+    where = {"cwd": tmp_path, "env": ros_environment | surroundings}
+    code, out, err = ran("demo", "--output", output, program=[script], **where)
+    assert code == 0, out + err
+    assert "Traceback" not in err
+    words = " ".join(out.split())
     assert words.index("the packing is tightened while the valve runs") > words.index("identified;")
     loose, tight = re.findall(
         r"coulomb_friction N (\S+) (\S+) [+-]\S+ % (\S+) (\S+) identified", words
@@ -351,17 +346,11 @@ def test_the_whole_story(ros_environment, tmp_path):
 
 def test_what_a_client_is_told(ros_environment):
     """Two nodes and a client as processes: every failure has its reason, and all end well."""
-    done = subprocess.run(
-        [sys.executable, Path(__file__).with_name("bench_visit.py")],
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=False,
-        env=ros_environment,
-    )
-    assert done.returncode == 0, done.stderr
-    assert "Traceback" not in done.stderr
-    told = json.loads(done.stdout)
+    script = Path(__file__).with_name("bench_visit.py")
+    code, out, err = ran(program=[script], env=ros_environment)
+    assert code == 0, err
+    assert "Traceback" not in err
+    told = json.loads(out)
     assert told["before"] == [0.0, None, {}]
     assert told["identify"].startswith("identify: no ")
     assert "actuator_pressure" in told["identify"]

@@ -10,12 +10,11 @@
 """`describe-valve`, and `inspect`: what is written once needs no option again."""
 
 import json
-import subprocess
-import sys
 
 import numpy as np
 import pytest
 import yaml
+from processes import ran
 
 from valve_friction_ros.records.columns import Columns
 from valve_friction_ros.records.valve_file import read_valve_file
@@ -103,38 +102,29 @@ def test_a_node_reads_it(command):
     assert out.count("  # ") >= 8
 
 
-def asked(answers, *arguments):
-    return subprocess.run(
-        [sys.executable, "-m", "valve_friction_ros", "describe-valve", *arguments],
-        check=False,
-        input=answers,
-        capture_output=True,
-        text=True,
-        timeout=300,
-    )
-
-
 def test_what_is_open_is_asked_for(tmp_path):
     path = tmp_path / "fv_101.yaml"
     answers = "".join(f"{SINGLE[name]}\n" for name in SINGLE if name != "area")
-    done = asked(answers, "--output", path, "--area", "690cm2")
-    assert (done.returncode, done.stdout) == (0, f"{path}\n")
-    assert "spring range (bench set) (0.2..1.0 bar, 3..15 psi) [none]: " in done.stderr
+    options = ("--output", path, "--area", "690cm2")
+    code, out, err = ran("describe-valve", *options, input=answers)
+    assert (code, out) == (0, f"{path}\n")
+    assert "spring range (bench set) (0.2..1.0 bar, 3..15 psi) [none]: " in err
     assert read_valve_file(path).valve.travel == pytest.approx(0.028575)
 
 
 def test_a_wrong_answer_is_asked_for_again():
     wrong = SINGLE | {"area": "690 ha\n690 cm2", "acting": "triple\nsingle"}
-    done = asked("".join(f"{answer}\n" for answer in wrong.values()))
-    assert done.returncode == 0
-    assert done.stderr.count("unknown unit 'ha'") == done.stderr.count("choose single or") == 1
-    assert "diaphragm_area: 0.069 " in done.stdout
+    answers = "".join(f"{answer}\n" for answer in wrong.values())
+    code, out, err = ran("describe-valve", input=answers)
+    assert code == 0
+    assert err.count("unknown unit 'ha'") == err.count("choose single or") == 1
+    assert "diaphragm_area: 0.069 " in out
 
 
 def test_after_the_last_wrong_answer_it_ends():
-    done = asked("FV-1\n690 cm2\n28 mm\ntriple\n")
-    assert (done.returncode, done.stdout) == (2, "")
-    assert done.stderr.count("'triple': choose single or double") == 2
+    code, out, err = ran("describe-valve", input="FV-1\n690 cm2\n28 mm\ntriple\n")
+    assert (code, out) == (2, "")
+    assert err.count("'triple': choose single or double") == 2
 
 
 def test_what_nobody_said_is_called_assumed(command):

@@ -21,6 +21,7 @@ from dask_workers import identify, local_cluster
 from documentation import PROJECT
 from kept_rows import kept, rows_of
 from local_server import certificate_pair
+from processes import ran
 from waiting import PATIENCE, wait_until
 
 from valve_friction_ros.commands import identify_folder
@@ -190,7 +191,6 @@ def test_refused_at_once(arguments, refused, monkeypatch):
 
 def test_dask_is_imported_for_a_scheduler_only():
     code = "import valve_friction_ros.commands.identify_folder, sys; print(*sys.modules)"
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=PROJECT
-    )
-    assert not {"dask", "distributed", "fsspec", "upath"} & set(done.stdout.split())
+    code, out, err = ran(program=["-c", code], cwd=PROJECT)
+    assert code == 0, err
+    assert not {"dask", "distributed", "fsspec", "upath"} & set(out.split())

@@ -11,13 +11,12 @@
 
 import json
 import math
-import subprocess
-import sys
 
 import matplotlib.image
 import numpy as np
 import pytest
 from answers import KEYS, column, known, none_for_nan, row_of, values
+from processes import ran
 
 from valve_friction_ros.identification import (
     PARAMETER_UNITS,
@@ -107,28 +106,16 @@ POSITION_BIAS = 1.13e-3
 FOUR_COLUMNS = ["--position-bias", str(POSITION_BIAS)]
 
 
-def run(*arguments, code="from valve_friction_ros.commands.main import main"):
-    """Run the command as a process of its own; without `code`, as `python -m` does."""
-    module = ["-m", "valve_friction_ros"]
-    how = module if code is None else ["-c", f"import sys; {code}; sys.exit(main())"]
-    return subprocess.run(
-        [sys.executable, *how, "identify", *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=False,
-    )
-
-
 class TestProcesses:
     """As typed into a shell."""
 
     def test_json_of_the_bench_record(self, write_csv, columns_of, square_record, bench_options):
         """What is asked of noise-free records, and the very numbers of the library."""
         path = write_csv(columns_of(square_record))
-        done = run(path, *bench_options, *FOUR_COLUMNS, *BENCH, "--json", code=None)
-        assert (done.returncode, done.stderr) == (0, "")
-        answer = json.loads(done.stdout)
+        options = (*bench_options, *FOUR_COLUMNS, *BENCH, "--json")
+        code, out, err = ran("identify", path, *options)
+        assert (code, err) == (0, "")
+        answer = json.loads(out)
         published = column(answer, "published")
         for found in (published, values(answer)):
             for name in ("viscous_friction", "coulomb_friction", "spring_constant"):
@@ -144,13 +131,14 @@ class TestProcesses:
     def test_without_ros(self, quick_csv, bench_options, tmp_path):
         """Not even a figure needs rclpy, nor the global state of matplotlib."""
         blocked = (
-            "sys.modules['rclpy'] = sys.modules['matplotlib.pyplot'] = None; "
-            "from valve_friction_ros.commands.main import main"
+            "import sys; sys.modules['rclpy'] = sys.modules['matplotlib.pyplot'] = None; "
+            "from valve_friction_ros.commands.main import main; sys.exit(main())"
         )
         picture = tmp_path / "record.png"
-        done = run(quick_csv, *bench_options, "--plot", picture, code=blocked)
-        assert (done.returncode, done.stderr) == (0, "")
-        assert "coulomb_friction" in done.stdout
+        arguments = ("identify", quick_csv, *bench_options, "--plot", picture)
+        code, out, err = ran(*arguments, program=["-c", blocked])
+        assert (code, err) == (0, "")
+        assert "coulomb_friction" in out
         assert picture.read_bytes().startswith(PNG)
 
 

@@ -12,13 +12,13 @@
 import gzip
 import json
 import os
-import subprocess
 import sys
 from datetime import datetime, timedelta, timezone
 from zoneinfo import ZoneInfo
 
 import numpy as np
 import pytest
+from processes import ran
 
 from valve_friction_ros.model import BENCH_VALVE, Recording, SensorNoise, SineWave, simulate
 
@@ -231,16 +231,9 @@ class TestWorkbooks:
 
 class TestPipes:
     def found(self, *arguments, **options):
-        command = [sys.executable, "-m", "valve_friction_ros", "identify", "--json", *QUICK]
-        done = subprocess.run(
-            [*command, *map(str, arguments)],
-            check=False,
-            capture_output=True,
-            timeout=300,
-            **options,
-        )
-        assert done.stderr == b""
-        return json.loads(done.stdout)["parameters"]["coulomb_friction"]["value"]
+        _, out, err = ran("identify", "--json", *QUICK, *arguments, text=False, **options)
+        assert err == b""
+        return json.loads(out)["parameters"]["coulomb_friction"]["value"]
 
     def test_standard_input(self, expected, record, valve):
         content = gzip.compress(export(record, seconds()).encode())

@@ -14,8 +14,6 @@ import dataclasses
 import json
 import math
 import re
-import subprocess
-import sys
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -25,6 +23,7 @@ import pytest
 from answers import KEYS, PARAMETER_KEYS, none_for_nan, row_of, values
 from bags import PRESSURE, messages_of, storage_file, write_bag
 from pages import PageReader
+from processes import ran
 
 from valve_friction_ros.identification import (
     CALIBRATION,
@@ -341,15 +340,9 @@ class TestOneValve:
             f"import sys; sys.modules.update(dict.fromkeys({blocked})); "
             "from valve_friction_ros.commands.main import main; sys.exit(main())"
         )
-        done = subprocess.run(
-            [sys.executable, "-c", code, "identify", str(bag), "--valve", str(bench_yaml)],
-            capture_output=True,
-            text=True,
-            timeout=300,
-            check=False,
-        )
-        assert (done.returncode, done.stderr) == (0, "")
-        assert "coulomb_friction" in done.stdout
+        code, out, err = ran("identify", bag, "--valve", bench_yaml, program=["-c", code])
+        assert (code, err) == (0, "")
+        assert "coulomb_friction" in out
 
 
 class TestSeveralValves:

@@ -12,12 +12,11 @@
 import csv
 import gzip
 import resource
-import subprocess
-import sys
 from functools import partial
 
 import pytest
 from histories import START, VALVE, success
+from processes import ran
 
 from valve_friction_ros.commands.main import run
 from valve_friction_ros.history import HistoryFile, KeptValve
@@ -34,20 +33,10 @@ def bounded(bench_yaml):
     """Function of arguments of `identify`: the one line of a process of little memory."""
 
     def bounded(*arguments):
-        done = subprocess.run(
-            [
-                *(sys.executable, "-m", "valve_friction_ros", "identify"),
-                *map(str, (*arguments, "--valve", bench_yaml)),
-            ],
-            check=False,
-            capture_output=True,
-            text=True,
-            timeout=300,
-            preexec_fn=partial(resource.setrlimit, resource.RLIMIT_DATA, (MEMORY, MEMORY)),
-        )
-        assert (done.returncode, done.stdout) == (2, "")
-        assert done.stderr.count("\n") == 1
-        return done.stderr
+        limited = partial(resource.setrlimit, resource.RLIMIT_DATA, (MEMORY, MEMORY))
+        code, out, err = ran("identify", *arguments, "--valve", bench_yaml, preexec_fn=limited)
+        assert (code, out, err.count("\n")) == (2, "", 1)
+        return err
 
     return bounded
 

@@ -10,13 +10,12 @@
 """Bags: which topics are a valve's, what is written, and what is used of rosbags for it."""
 
 import os
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 from bags import stamps_of
+from processes import ran
 from rosbags.rosbag2 import Reader
 
 from valve_friction_ros.identification import RefusalError
@@ -235,15 +234,8 @@ except OSError as error:
 def test_a_file_that_may_not_grow(tmp_path):
     """As on a full disk: the reason is told, and nothing is left behind."""
     environment = os.environ | {"PYTHONPATH": str(Path(__file__).resolve().parents[2])}
-    done = subprocess.run(
-        [sys.executable, "-c", FULL_DISK, str(tmp_path)],
-        env=environment,
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=True,
-    )
-    assert (done.stdout, done.stderr) == ("File too large\n", "")
+    told = ran(tmp_path, program=["-c", FULL_DISK], env=environment)
+    assert told == (0, "File too large\n", "")
     assert list(tmp_path.iterdir()) == []
 
 

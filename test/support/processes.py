@@ -7,14 +7,24 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Processes that tests have started, found by their environment."""
+"""Processes that tests have started, found by their environment; and commands run to their end."""
 
 import contextlib
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 MARK = "VALVE_FRICTION_TESTS"
 """Environment variable of all that a test starts: the process that runs the test."""
+
+
+def ran(*arguments, program=("-m", "valve_friction_ros"), **options):
+    """Run Python on a program, by default the command, to its end: code, stdout and stderr."""
+    words = [sys.executable, *map(str, (*program, *arguments))]
+    usual = {"capture_output": True, "text": True, "timeout": 300}
+    done = subprocess.run(words, check=False, **(usual | options))
+    return done.returncode, done.stdout, done.stderr
 
 
 def processes_with(words):
