@@ -31,7 +31,6 @@ from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.records.bags.rosbags_internals import (
     McapFile,
-    UndecodableError,
     decode,
     stamp_of,
 )
@@ -341,9 +340,8 @@ class ValveFeed:
 
     def _read(self, data: bytes, topic: str | None, kind: str) -> tuple[int, Any] | None:
         """Decode a message; None if this fails or the stamp is outside the stretch."""
-        try:
-            message = decode(data, kind)
-        except UndecodableError:
+        message = decode(data, kind)
+        if message is None:
             self._undecodable[str(topic)] = self._undecodable.get(str(topic), 0) + 1
             return None
         stamp = stamp_of(message)

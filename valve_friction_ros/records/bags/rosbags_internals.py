@@ -90,28 +90,21 @@ class McapFile:
         self._reader.close()
 
 
-class UndecodableError(ValueError):
-    """Bytes that are not a message of the type of their topic."""
-
-
-def decode(data: bytes, kind: str) -> Any:
+def decode(data: bytes, kind: str) -> Any | None:
     """Decode a message, compressed by its recorder or not, ignoring bytes after its end.
 
-    Raises UndecodableError if the bytes are not such a message.
+    Returns None if the bytes are not such a message.
     """
-    if data.startswith(ZSTD):
-        try:
-            data = zstd.decompress(data)
-        except zstd.ZstdError as error:
-            raise UndecodableError(str(error)) from None
-    if len(data) < 4 or data[0] != 0 or data[1] > 1:
-        raise UndecodableError("not in CDR")
-    definition = TYPES.get_msgdef(kind)
-    read = definition.deserialize_cdr_le if data[1] else definition.deserialize_cdr_be
     try:
+        if data.startswith(ZSTD):
+            data = zstd.decompress(data)
+        if len(data) < 4 or data[0] != 0 or data[1] > 1:  # not in CDR
+            return None
+        definition = TYPES.get_msgdef(kind)
+        read = definition.deserialize_cdr_le if data[1] else definition.deserialize_cdr_be
         message, _ = read(data[4:], 0, definition.cls, TYPES)
-    except (SerdeError, struct.error, ValueError, IndexError) as error:
-        raise UndecodableError(str(error)) from None
+    except (SerdeError, zstd.ZstdError, struct.error, ValueError, IndexError):
+        return None
     return message
 
 
