@@ -206,21 +206,20 @@ class _Recognition(Look):
         return TimeForm(unit="s")
 
     def _dates(self, texts: Sequence[str], zone: str) -> TimeForm:
-        forms = date_forms(texts)
-        orders = [one for one in forms[:3] if one] if forms else []
-        if forms is None or not orders:
+        orders, has_zone = date_forms(texts)
+        if not orders:
             self.questions.append(
                 f"the format of the dates, such as {quoted(texts[0])} (--time-format "
                 "'%d.%m.%Y %H:%M:%S.%f')"
             )
             return TimeForm(("%Y",))
-        if not (zone or forms.has_zone):
+        if not (zone or has_zone):
             self._ask_zone()
         if len(orders) > 1:
             words = {"%d": "the day first", "%m": "the month", "%y": "the year"}
             told = [f"{words[one[0][:2]]} (--time-format {shlex.quote(one[0])})" for one in orders]
             self.questions.append(f"whether {quoted(texts[0])} has {' or '.join(told)}")
-        return TimeForm(orders[0], zone, has_zone=forms.has_zone)
+        return TimeForm(orders[0], zone, has_zone=has_zone)
 
     def _stated_zone(self) -> str:
         """Return the time zone named above the values, such as Europe/Berlin, or ''."""

@@ -13,7 +13,7 @@ import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timezone
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -130,17 +130,12 @@ class TimeForm:
     is_assumed: bool = False
 
 
-class DateForms(NamedTuple):
-    """Possible formats of the dates in a column: with day, month or two-digit year first."""
+def date_forms(texts: Sequence[str]) -> tuple[list[tuple[str, ...]], bool]:
+    """Find the formats that fit all texts, and whether each text has a zone.
 
-    day_first: tuple[str, ...]
-    month_first: tuple[str, ...]
-    year_first: tuple[str, ...]
-    has_zone: bool
-
-
-def date_forms(texts: Sequence[str]) -> DateForms | None:
-    """Find the formats that fit all texts; None if a text is not a date with a time."""
+    The formats are grouped by their order: day, month or two-digit year first. There is no group if
+    a text is not a date with a time.
+    """
     day: dict[str, None] = {}
     month: dict[str, None] = {}
     year: dict[str, None] = {}
@@ -150,7 +145,7 @@ def date_forms(texts: Sequence[str]) -> DateForms | None:
         text = _normal(raw)
         found = _STAMP.fullmatch(text)
         if found is None:
-            return None
+            return [], False
         has_zone &= found["zone"] is not None
         day[_format(found, "%d", "%m")] = None
         if found["first"] is None:
@@ -169,12 +164,9 @@ def date_forms(texts: Sequence[str]) -> DateForms | None:
             day_possible = False  # 7/1/2026 2:00 PM; with the day first it would be 1/07
         month[_format(found, "%m", "%d")] = None
         year[_format(found, "%y", "%m", "%d")] = None
-    return DateForms(
-        _with_and_without_fraction(day) if day_possible else (),
-        _with_and_without_fraction(month) if month_possible else (),
-        _with_and_without_fraction(year) if year_possible else (),
-        has_zone,
-    )
+    groups = ((day, day_possible), (month, month_possible), (year, year_possible))
+    orders = [_with_and_without_fraction(forms) for forms, possible in groups if forms and possible]
+    return orders, has_zone
 
 
 def _with_and_without_fraction(forms: Iterable[str]) -> tuple[str, ...]:
