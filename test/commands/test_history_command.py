@@ -10,7 +10,6 @@
 """The sub-command `history`, as a person runs it."""
 
 import argparse
-import csv
 import json
 import math
 from dataclasses import replace
@@ -18,6 +17,7 @@ from dataclasses import replace
 import matplotlib.image
 import pytest
 from histories import DAY, OTHER, START, VALVE, refused, success
+from kept_rows import csv_rows
 
 from valve_friction_ros.commands.arguments.declared import DECLARATIONS
 from valve_friction_ros.health import Baseline, FrictionLimits, Level
@@ -216,8 +216,7 @@ class TestChoice:
 def test_csv(run, tmp_path, file):
     path = tmp_path / "history.csv"
     assert run("--csv", path)[0] == 0
-    with path.open(encoding="utf-8", newline="") as stream:
-        rows = list(csv.DictReader(stream))
+    rows = csv_rows(path)
     entries = HistoryFile(file).entries()
     assert len(rows) == len(entries) == 24
     for row, entry in zip(rows, entries, strict=True):

@@ -9,12 +9,12 @@
 
 """The sub-command `history` on usage and alarm recordings."""
 
-import csv
 import json
 from pathlib import Path
 
 import pytest
 from histories import DAY, OTHER, START, VALVE, success
+from kept_rows import csv_rows
 
 from valve_friction_ros.health import Level
 from valve_friction_ros.history import (
@@ -94,8 +94,7 @@ def test_days_in_json_and_csv(run, tmp_path):
     assert code == 0
     (valve,) = json.loads(output)["valves"]
     assert [one["day"] for one in valve["usage"]["days"]] == ["2026-09-22"]
-    with path.open(encoding="utf-8", newline="") as stream:
-        (row,) = csv.DictReader(stream)
+    (row,) = csv_rows(path)
     assert (row["day"], row["tag"], row["packing_renewed"]) == ("2026-09-22", "FV-101", "")
     assert float(row["distance_m"]) == 1.5
     assert float(row["time_at_95_to_100_percent_s"]) == 72_000

@@ -9,7 +9,6 @@
 
 """The sub-command `identify-folder`: many recordings, interrupted and resumed."""
 
-import csv
 import gzip
 import json
 import os
@@ -24,7 +23,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bags import messages_of, write_bag
-from kept_rows import kept, rows_of
+from kept_rows import csv_rows, kept, rows_of
 from waiting import PATIENCE, wait_until
 
 from valve_friction_ros.commands.main import run as run_here
@@ -106,8 +105,7 @@ def run(arguments, script=None):
 
 
 def done(path):
-    with path.open(newline="") as stream:
-        return Counter((row["recording"], row["valve"]) for row in csv.DictReader(stream))
+    return Counter((row["recording"], row["valve"]) for row in csv_rows(path))
 
 
 def children(process):

@@ -9,7 +9,6 @@
 
 """The sub-command `identify` on plants, machines, packings that slip, and a first survey."""
 
-import csv
 import dataclasses
 import json
 import math
@@ -22,6 +21,7 @@ import numpy as np
 import pytest
 from answers import KEYS, PARAMETER_KEYS, none_for_nan, row_of, values
 from bags import PRESSURE, messages_of, storage_file, write_bag
+from kept_rows import csv_rows
 from pages import PageReader
 from processes import ran
 
@@ -267,8 +267,7 @@ def test_of_a_folder(command, graphite_file, given, survey, tmp_path):
     table = tmp_path / "results.csv"
     words = folder, "--valve", graphite_file, "--method", "bench", "--output", table
     assert command("identify-folder", *words, *given)[0] == 0
-    with table.open(newline="") as lines:
-        assert [row["survey"] for row in csv.DictReader(lines)] == [survey]
+    assert [row["survey"] for row in csv_rows(table)] == [survey]
 
 
 def test_limits_out_of_order_are_refused(refusal, graphite_file):

@@ -9,7 +9,6 @@
 
 """The sub-command `plan-test`: what it knows, what it writes, what it refuses."""
 
-import csv
 import json
 import re
 from pathlib import Path
@@ -18,6 +17,7 @@ import matplotlib.image
 import numpy as np
 import pytest
 from histories import VALVE, success
+from kept_rows import csv_rows
 
 from valve_friction_ros.history import HistoryFile
 from valve_friction_ros.model import BENCH_VALVE, LOW_FRICTION, simulate
@@ -56,9 +56,8 @@ def test_the_file_moves_the_stem_as_it_was_told(plan, tmp_path):
     code, out, err = plan(*KNOWN, *QUICK, "--converter-lag", "0", "--figure", picture, "--json")
     assert (code, err) == (0, "")
     told = json.loads(out, parse_constant=pytest.fail)
-    with (tmp_path / "test.csv").open() as stream:
-        rows = [(float(row["time_s"]), float(row["pressure_pa"])) for row in csv.DictReader(stream)]
-    times, pressures = np.array(rows).T
+    rows = csv_rows(tmp_path / "test.csv")
+    times, pressures = np.array([(row["time_s"], row["pressure_pa"]) for row in rows], float).T
     assert times[0] == 0.0
     assert times[-1] == pytest.approx(told["duration"], abs=1e-6)
     assert times[-1] <= 15.0
@@ -168,10 +167,8 @@ class TestWithoutRos:
         table, form = tmp_path / "steps.csv", tmp_path / "form.txt"
         code, _, err = plan(*KNOWN, *QUICK, "--table", table, "--form", form)
         assert (code, err) == (0, "")
-        with table.open() as stream:
-            rows = list(csv.DictReader(stream))
-        with (tmp_path / "test.csv").open() as stream:
-            corners = [tuple(map(float, row.values())) for row in csv.DictReader(stream)]
+        rows = csv_rows(table)
+        corners = [tuple(map(float, row.values())) for row in csv_rows(tmp_path / "test.csv")]
         ends = [float(row["time_s"]) + float(row["within_s"]) for row in rows]
         assert ends == pytest.approx([time for time, _ in corners], abs=0.011)
         pressures = np.array([pressure for _, pressure in corners])
@@ -199,8 +196,7 @@ class TestWithoutRos:
             table, form = tmp_path / f"{name}.csv", tmp_path / f"{name}.txt"
             options = ("--table", table, "--form", form, "--replace", *units)
             assert plan(*KNOWN, *QUICK, *options)[0] == 0
-            with table.open() as stream:
-                written[name] = list(csv.DictReader(stream)), form.read_text()
+            written[name] = csv_rows(table), form.read_text()
         (metric, _), (inches, text) = written["si"], written["us"]
         assert "pressure_kpa" not in inches[0]
         for one, other in zip(inches, metric, strict=True):

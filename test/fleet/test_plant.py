@@ -10,7 +10,6 @@
 """A folder is a plant: exports of several forms, one table of valves, a history by tag and time."""
 
 import contextlib
-import csv
 import io
 import math
 import os
@@ -27,6 +26,7 @@ from zoneinfo import ZoneInfo
 import numpy as np
 import pytest
 from browser import Tab, chromium
+from kept_rows import rows_of
 from local_server import free_port
 
 from valve_friction_ros import history
@@ -108,11 +108,6 @@ def identify(folder, *words):
     return run(["identify-folder", *map(str, arguments), *map(str, outputs)])
 
 
-def rows_of(folder, key="recording"):
-    with (folder / "friction.csv").open() as stream:
-        return {row[key]: row for row in csv.DictReader(stream)}
-
-
 @pytest.fixture(scope="module")
 def plant(tmp_path_factory):
     """Five quarters of FV-101, whose packing is tightened, one of FV-102, and two bad exports."""
@@ -169,7 +164,7 @@ def test_the_growth_is_a_trend(plant, done):
 
 def test_rows_have_the_tag_the_time_and_the_ratio(plant, done):
     assert done
-    row = rows_of(plant)["Q5/fv101 stroke.csv"]
+    row = rows_of(plant / "friction.csv")["Q5/fv101 stroke.csv"]
     assert (row["valve"], row["began"]) == ("FV-101", "2026-07-03T06:00:00Z")
     assert float(row["ratio"]) == pytest.approx(1.8, rel=0.05)
     page = (plant / "friction.html").read_text()
@@ -202,7 +197,7 @@ def test_a_first_survey_ranks_by_the_dead_band_and_says_what_to_do(tmp_path, cap
     assert first < out.index("plan work on the packing") < second
     assert second < out.index("record it again within three months")
     assert "FV-101" not in out
-    rows = rows_of(tmp_path, "valve")
+    rows = rows_of(tmp_path / "friction.csv", "valve")
     assert [rows[tag]["survey"] for tag in sorted(rows)] == ["good", "bad", "watch"]
     shares = [float(rows[tag]["dead_band_of_travel"]) for tag in sorted(rows)]
     stiffness = LOW_FRICTION.spring_constant * BENCH_VALVE.travel
@@ -230,7 +225,7 @@ def test_files_of_single_signals_are_one_record_of_their_valve(tmp_path, capsys)
     make_plant(tmp_path, exports, table)
     assert identify(tmp_path, "--fix", "mass=1.6") == 0
     capsys.readouterr()
-    rows = rows_of(tmp_path)
+    rows = rows_of(tmp_path / "friction.csv")
     found = {name: (row["valve"], row["began"]) for name, row in rows.items()}
     times = [f"{one:%Y-%m-%dT%H:%M:%SZ}" for one in QUARTERS]
     assert found == {
@@ -268,7 +263,7 @@ def test_the_class_of_the_packing_counts_in_the_history_and_on_its_page(tmp_path
     make_plant(tmp_path, {"FV-102.csv": german(QUARTERS[0], *stroke(800.0, 1))})
     place = tmp_path / "history.sqlite"
     assert identify(tmp_path, "--history", place, "--packing", "graphite", *BERLIN) == 0
-    assert rows_of(tmp_path)["FV-102.csv"]["survey"] == "watch"
+    assert rows_of(tmp_path / "friction.csv")["FV-102.csv"]["survey"] == "watch"
     (entry,) = entries(tmp_path, "FV-102")
     assert entry.diagnosis.message.endswith("watch, by the limits for a first survey")
     valves = Plant(math.inf)
@@ -478,7 +473,7 @@ class TestSeizedStem:
         assert codes == [3, 3]
         assert " ERROR FV-101 1.csv FV-101: the stem stayed at " in out
         assert "\n       inspect the stem and repeat the test with more force\n" in out
-        moved, seized = rows_of(folder).values()
+        moved, seized = rows_of(folder / "friction.csv").values()
         assert (moved["level"], moved["error"]) == ("OK", "")
         assert (seized["level"], seized["ne_107"]) == ("ERROR", "F")
         assert seized["error"].startswith("the stem did not move: ")
@@ -501,7 +496,7 @@ class TestSeizedStem:
         make_plant(tmp_path, {name: (folder / "exports" / name).read_text()})
         page = tmp_path / "friction.html"
         assert identify(tmp_path, "--history", tmp_path / "history.sqlite", "--output", page) == 2
-        (seized,) = rows_of(tmp_path).values()
+        (seized,) = rows_of(tmp_path / "friction.csv").values()
         assert (seized["level"], seized["what_to_do"]) == ("", "")
         assert ">refused<" in page.read_text()
         file = HistoryFile(tmp_path / "history.sqlite")

@@ -15,10 +15,15 @@ import shutil
 import sqlite3
 
 
-def rows_of(path):
+def csv_rows(path):
+    """Rows of a table, each a mapping by its headers."""
+    with path.open(encoding="utf-8", newline="") as stream:
+        return list(csv.DictReader(stream))
+
+
+def rows_of(path, key="recording"):
     """Rows of a table, by the names of the recordings of one valve each."""
-    with path.open(newline="") as stream:
-        return {row["recording"]: row for row in csv.DictReader(stream)}
+    return {row[key]: row for row in csv_rows(path)}
 
 
 def kept(output):
