@@ -384,6 +384,30 @@ class TestEntries:
         missing = read_csv(write(with_row(12, "0.01,0.003")))
         assert missing.stamped.drive.value.size == 39
 
+    def test_single_zeros(self, write):
+        """A signal of a historian that falls to 0 for one sample has lost its transmitter.
+
+        Zeros next to small values are the closed valve.
+        """
+        time = np.arange(400) / 10
+        position = np.maximum(40 * np.sin(time / 4), 0.01 * (np.arange(400) % 2))  # mm
+        pressure = 1 + 0.5 * np.sin(time / 4)  # bar
+        lost = {"position": [25, 30, 300], "pressure": [100, 300]}
+        shown = {"position": position.copy(), "pressure": pressure.copy()}
+        for name, places in lost.items():
+            shown[name][places] = 0.0
+        heads = "Time [s],Stem position [mm],Actuator pressure [bar]"
+        found = recorded(write([heads, *rows(time, *shown.values())]), Valve(0.05, travel=0.04))
+        stamped = found.recording().stamped
+        np.testing.assert_array_equal(
+            stamped.position.value, np.delete(position, [25, 30, 300]) / 1e3
+        )
+        np.testing.assert_array_equal(stamped.drive.value, np.delete(pressure, [100, 300]) * 1e5)
+        assert [note.partition(" ")[0] for note in found.notes if "('dropout to 0' " in note] == [
+            "2",
+            "3",
+        ]
+
     def test_beyond_the_share(self, write):
         lines = with_row(12, "0.01,closed,1e5")
         lines[20:23] = ["0.019,open,1e5", "0.02,open,1e5", "0.021,open,1e5"]
