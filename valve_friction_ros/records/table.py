@@ -49,8 +49,8 @@ _MOST_REPEATED = 0.5
 """Largest share of rows that may repeat the previous row exactly. Chosen."""
 _DROPOUT = "dropout to 0"
 _LEAST_FALL = 5.0
-"""Least fall to a single 0, over the change that it interrupts and over the steps of the signal, for
-it to be a dropout: neither stem nor actuator moves so for one sample. Chosen."""
+"""A single 0 is a dropout if the signal falls to it by this many times the change around it, and
+the steps elsewhere: neither stem nor actuator moves so for one sample. Chosen."""
 
 
 @dataclass(eq=False)
