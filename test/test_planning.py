@@ -146,6 +146,15 @@ def test_a_band_too_narrow_for_the_friction_is_refused_with_the_remedy():
     assert f"the band spans {given_:.4g}" in message
 
 
+@pytest.mark.parametrize("lowest", [0.1, 0.4, 0.45, 0.8])
+def test_a_tenth_of_the_travel_just_moves_a_medium_packing(lowest):
+    """Of k·travel: 2·5 % + the least stroke of 3 % are the part of 10 % + 2·1.5 %."""
+    valve = Valve(0.049257966, 0.0, 0.01905)
+    frictions = unknown_friction(valve, (160451.206, 2037.73032), 1.0)
+    band = pressure_band(valve, frictions, Limits(lowest, lowest + 0.1))
+    assert stroke(valve, frictions.draws[1], band) == pytest.approx(0.03 * valve.travel)
+
+
 def test_a_narrow_range_of_the_pressure_is_named():
     with pytest.raises(RefusalError, match=r"or the range of the pressure$"):
         pressure_band(BENCH_VALVE, frictions(), Limits(pressure_maximum=9e4))
