@@ -530,11 +530,22 @@ def test_it_can_be_started_again_after_each_end_and_not_while_it_plays():
     assert play(test, 200.0, 204.0)[-1, 1] == pytest.approx(1e5 + 0.4e5 * 1.05 / 2, rel=1e-3)
 
 
+def test_a_start_that_is_refused_leaves_the_reason_of_the_last_return():
+    test = started()
+    hear(test, 100.1, 0.03)
+    test.step(100.1)
+    told = str(test)
+    assert "the stem reached 0.03 m, beyond its limit of 0.02 m" in told
+    with pytest.raises(RefusalError, match=r"no stem position has been received for 9.9 s"):
+        test.start(110.0)
+    assert str(test) == told
+
+
 @pytest.mark.parametrize(
     ("stem", "pressure", "cause"),
     [
-        (None, 1.1e5, "no stem position was received"),
-        (0.01, None, "no pressure was received"),
+        (None, 1.1e5, "no stem position has been received so far "),
+        (0.01, None, "no pressure has been received so far "),
         (0.03, 1.1e5, "beyond its limit of 0.02 m"),
         (0.01, 2e5, "beyond its limit of 150000 Pa"),
     ],
@@ -544,7 +555,7 @@ def test_it_does_not_start_on_signals_that_would_end_it(stem, pressure, cause):
     hear(test, 100.0, stem, pressure)
     with pytest.raises(RefusalError, match=cause) as refusal:
         test.start(100.0)
-    assert str(refusal.value).startswith("no pressure is set: ")
+    assert str(refusal.value).startswith("nothing is played: ")
     assert test.step(100.0) is None
 
 
