@@ -146,6 +146,15 @@ def test_a_band_too_narrow_for_the_friction_is_refused_with_the_remedy():
     assert f"the band spans {given_:.4g}" in message
 
 
+@pytest.mark.parametrize("lowest", [0.1, 0.4, 0.45, 0.8])
+def test_a_tenth_of_the_travel_just_moves_a_medium_packing(lowest):
+    """Of k·travel: 2·5 % + the least stroke of 3 % are the part of 10 % + 2·1.5 %."""
+    valve = Valve(0.049257966, 0.0, 0.01905)
+    frictions = unknown_friction(valve, (160451.206, 2037.73032), 1.0)
+    band = pressure_band(valve, frictions, Limits(lowest, lowest + 0.1))
+    assert stroke(valve, frictions.draws[1], band) == pytest.approx(0.03 * valve.travel)
+
+
 def test_a_narrow_range_of_the_pressure_is_named():
     with pytest.raises(RefusalError, match=r"or the range of the pressure$"):
         pressure_band(BENCH_VALVE, frictions(), Limits(pressure_maximum=9e4))
@@ -521,11 +530,22 @@ def test_it_can_be_started_again_after_each_end_and_not_while_it_plays():
     assert play(test, 200.0, 204.0)[-1, 1] == pytest.approx(1e5 + 0.4e5 * 1.05 / 2, rel=1e-3)
 
 
+def test_a_start_that_is_refused_leaves_the_reason_of_the_last_return():
+    test = started()
+    hear(test, 100.1, 0.03)
+    test.step(100.1)
+    told = str(test)
+    assert "the stem reached 0.03 m, beyond its limit of 0.02 m" in told
+    with pytest.raises(RefusalError, match=r"no stem position has been received for 9.9 s"):
+        test.start(110.0)
+    assert str(test) == told
+
+
 @pytest.mark.parametrize(
     ("stem", "pressure", "cause"),
     [
-        (None, 1.1e5, "no stem position was received"),
-        (0.01, None, "no pressure was received"),
+        (None, 1.1e5, "no stem position has been received so far "),
+        (0.01, None, "no pressure has been received so far "),
         (0.03, 1.1e5, "beyond its limit of 0.02 m"),
         (0.01, 2e5, "beyond its limit of 150000 Pa"),
     ],
@@ -535,7 +555,7 @@ def test_it_does_not_start_on_signals_that_would_end_it(stem, pressure, cause):
     hear(test, 100.0, stem, pressure)
     with pytest.raises(RefusalError, match=cause) as refusal:
         test.start(100.0)
-    assert str(refusal.value).startswith("no pressure is set: ")
+    assert str(refusal.value).startswith("nothing is played: ")
     assert test.step(100.0) is None
 
 

@@ -448,8 +448,8 @@ def misfit_words(misfit: float, unit: str) -> str:
 _ABORTS = {
     "POSITION": "the stem reached {0:.4g} m, beyond its limit of {1:.4g} m",
     "PRESSURE": "the measured pressure was {0:.6g} Pa, beyond its limit of {1:.6g} Pa",
-    "SILENT_STEM": "no stem position was received for {0} (limit {1:g} s)",
-    "SILENT_PRESSURE": "no pressure was received for {0} (limit {1:g} s)",
+    "SILENT_STEM": "no stem position has been received {0} (limit {1:g} s)",
+    "SILENT_PRESSURE": "no pressure has been received {0} (limit {1:g} s)",
     "HELD_UP": "the player stalled for {0:.2g} s (limit {1:g} s)",
     "ASKED": "an operator stopped it",
     "SHUTDOWN": "the player was shut down",
@@ -460,7 +460,7 @@ def played_test_words(why: str, found: float, limit: float) -> str:
     """Write why a test returns to its start, with the value found and its limit."""
     if not why.startswith("SILENT"):
         return _ABORTS[why].format(found, limit)
-    time = f"{found:.2g} s" if math.isfinite(found) else "the whole time"
+    time = f"for {found:.2g} s" if math.isfinite(found) else "so far"
     return _ABORTS[why].format(time, limit)
 
 

@@ -12,10 +12,13 @@
 The sub-command is this module, one line of `SUB_COMMANDS` and a declaration of its arguments.
 """
 
+import io
 import os
 import signal
 import sys
 import time
+
+import pandas as pd
 
 from valve_friction_ros.commands import main
 from valve_friction_ros.commands.arguments import declared
@@ -29,24 +32,39 @@ class Interrupting:
         os.kill(os.getpid(), signal.SIGINT)
 
 
+class InterruptingFile(io.RawIOBase):
+    def readable(self):
+        return True
+
+    def readinto(self, _):
+        os.kill(os.getpid(), signal.SIGINT)
+        return 0
+
+
 def declare(parser):
     parser.description = "One sub-command more."
     parser.add_argument("ending")
 
 
-def run(options):
-    if options.ending == "interrupted":
+def interrupt(ending):
+    if ending == "interrupted":
         os.kill(os.getpid(), signal.SIGINT)
-    if options.ending == "disguised":  # as numpy does while it is imported
+    if ending == "disguised":  # as numpy does while it is imported
         try:
             os.kill(os.getpid(), signal.SIGINT)
         except KeyboardInterrupt as interrupt:
             raise ImportError("numpy cannot be imported") from interrupt
-    if options.ending == "ignored":
+    if ending == "in a parser":
+        pd.read_csv(InterruptingFile())
+    if ending == "ignored":
         Interrupting()
         time.sleep(30)
-    if options.ending == "swallowed":
+    if ending == "swallowed":
         import swallowing_module  # noqa: F401
+
+
+def run(options):
+    interrupt(options.ending)
     if options.ending == "own refusal":
         raise RefusalError("not this\none")
     if options.ending == "refusal":

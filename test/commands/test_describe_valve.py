@@ -194,6 +194,12 @@ def export(tmp_path):
 ANSWERS = ("--pressure-unit", "bar", "--position-unit", "mm")
 
 
+def test_a_bag_is_no_table(command, tmp_path):
+    code, _, err = command("inspect", tmp_path)
+    assert code == 2
+    assert ": a bag, not a table: " in err
+
+
 def test_what_would_be_read(command, export):
     code, out, err = command("inspect", export)
     assert code == 2

@@ -133,7 +133,9 @@ class TestEnd:
     def test_refused(self, ending, line):
         assert extra(ending) == (2, "", f"valve_friction extra: {line}\n")
 
-    @pytest.mark.parametrize("ending", ["interrupted", "disguised", "ignored", "swallowed"])
+    @pytest.mark.parametrize(
+        "ending", ["interrupted", "disguised", "in a parser", "ignored", "swallowed"]
+    )
     def test_interrupted(self, ending):
         assert extra(ending) == (130, "", "valve_friction extra: interrupted\n")
 

@@ -16,6 +16,7 @@ from pathlib import Path
 import matplotlib.image
 import numpy as np
 import pytest
+import yaml
 from histories import VALVE, success
 from kept_rows import csv_rows
 
@@ -163,9 +164,13 @@ def test_percentages(plan, capsys, text):
 class TestWithoutRos:
     """Set points for a control system, and a form for a person."""
 
-    def test_the_table_is_the_test_in_other_units(self, plan, tmp_path):
+    def test_the_table_is_the_test_in_other_units(self, plan, tmp_path, bench_yaml):
         table, form = tmp_path / "steps.csv", tmp_path / "form.txt"
-        code, _, err = plan(*KNOWN, *QUICK, "--table", table, "--form", form)
+        valve = tmp_path / "valve.yaml"
+        parameters = {**yaml.safe_load(bench_yaml.read_text()), "valve_tag": "31-FV 7"}
+        valve.write_text(yaml.safe_dump({"/**": {"ros__parameters": parameters}}))
+        named = ("--valve", valve, "--table", table, "--form", form)
+        code, _, err = plan(*KNOWN, *QUICK, *named)
         assert (code, err) == (0, "")
         rows = csv_rows(table)
         corners = [tuple(map(float, row.values())) for row in csv_rows(tmp_path / "test.csv")]
@@ -186,6 +191,8 @@ class TestWithoutRos:
         assert any("reversal" in row["tells"] for row in rows)
         text = form.read_text()
         assert "ABORT" in text
+        assert "valve 31-FV 7   date" in text
+        assert "of the travel, counted from its end without air," in text
         assert f"{float(rows[0]['abort_above_mm']):.1f} mm" in text
 
     def test_table_and_form_in_psi_and_inch(self, plan, tmp_path, capsys):

@@ -72,6 +72,17 @@ def test_what_counts(plant):
     assert stems[:7] == ["c", "d", "e", "old", "t", "u", "b"]
 
 
+@pytest.mark.parametrize(
+    "row", ["FV-101.PV\t2026-03-02T10:00:00.0{}Z\t1.25\tGood", '"0{}.5";"1.25"', "{} 1.5"]
+)
+def test_a_text_with_numbers_is_a_recording(tmp_path, row):
+    (tmp_path / "dump.txt").write_text("\n".join(row.format(number) for number in range(9)))
+    (tmp_path / "notes.txt").write_text("Stroked on 2 March.\nFV-101: 5 bar, slow.\nSee page 3\n")
+    findings = find_recordings(tmp_path)
+    assert [one.name for one in findings.recordings] == ["dump.txt"]
+    assert findings.skipped == ("notes.txt",)
+
+
 def test_a_bag_that_lost_its_storage_is_a_recording_to_complain_of(tmp_path):
     (tmp_path / "bag").mkdir()
     (tmp_path / "bag" / "metadata.yaml").write_text("rosbag2_bagfile_information: {}")

@@ -162,6 +162,13 @@ def test_the_growth_is_a_trend(plant, done):
     assert levels == ["OK", "OK", "WARN", "WARN", "WARN"]
 
 
+def test_only_the_last_record_of_a_valve_is_an_alarm(done):
+    """Three of five are: those of earlier quarters crowded other valves out of the list."""
+    assert [line.split(":")[0] for line in done[1].splitlines() if " FV-101: " in line] == [
+        "  WARN Q5/fv101 stroke.csv FV-101"
+    ]
+
+
 def test_rows_have_the_tag_the_time_and_the_ratio(plant, done):
     assert done
     row = rows_of(plant / "friction.csv")["Q5/fv101 stroke.csv"]

@@ -327,6 +327,14 @@ def test_a_page_in_this_order():
     assert page.outside == []
 
 
+def test_a_refused_recording_without_a_tag_is_no_valve():
+    rows = [row("q1", valve="FV-1"), row("q2", valve="FV-1"), row("lost", None, error="no tag")]
+    assert "<title>Friction of 1 valve in 3 recordings: " in page_text(rows, "plant")
+    assert "<title>Friction of 3 valves: " in page_text(
+        [row("a"), row("b"), row("c", None)], "plant"
+    )
+
+
 def test_text_from_outside_is_text():
     report = "plant_reports/a b&<.html"
     evil = row(EVIL, valve=EVIL, ratio=1.0, message=EVIL, report=report)

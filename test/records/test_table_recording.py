@@ -12,11 +12,13 @@
 import gzip
 import math
 import re
+import zipfile
 from dataclasses import replace
 from datetime import datetime, timedelta, timezone
 
 import numpy as np
 import pytest
+import scipy.io
 
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.model import BENCH_VALVE, Drive, Valve
@@ -379,6 +381,30 @@ class TestEntries:
         missing = read_csv(write(with_row(12, "0.01,0.003")))
         assert missing.stamped.drive.value.size == 39
 
+    def test_single_zeros(self, write):
+        """A signal of a historian that falls to 0 for one sample has lost its transmitter.
+
+        Zeros next to small values are the closed valve.
+        """
+        time = np.arange(400) / 10
+        position = np.maximum(40 * np.sin(time / 4), 0.01 * (np.arange(400) % 2))  # mm
+        pressure = 1 + 0.5 * np.sin(time / 4)  # bar
+        lost = {"position": [25, 30, 300], "pressure": [100, 300]}
+        shown = {"position": position.copy(), "pressure": pressure.copy()}
+        for name, places in lost.items():
+            shown[name][places] = 0.0
+        heads = "Time [s],Stem position [mm],Actuator pressure [bar]"
+        found = recorded(write([heads, *rows(time, *shown.values())]), Valve(0.05, travel=0.04))
+        stamped = found.recording().stamped
+        np.testing.assert_array_equal(
+            stamped.position.value, np.delete(position, [25, 30, 300]) / 1e3
+        )
+        np.testing.assert_array_equal(stamped.drive.value, np.delete(pressure, [100, 300]) * 1e5)
+        assert [note.partition(" ")[0] for note in found.notes if "('dropout to 0' " in note] == [
+            "2",
+            "3",
+        ]
+
     def test_beyond_the_share(self, write):
         lines = with_row(12, "0.01,closed,1e5")
         lines[20:23] = ["0.019,open,1e5", "0.02,open,1e5", "0.021,open,1e5"]
@@ -476,6 +502,31 @@ class TestUnreadableFiles:
         path = tmp_path / f"record.{ending}"
         path.write_bytes(b"")
         assert refused(path) == "the file is empty"
+
+    @pytest.mark.parametrize(
+        ("start", "told"),
+        [
+            (b"\x89HDF\r\n\x1a\n\0\0", "as a table: an HDF5 file: save it as Parquet or CSV"),
+            (b"ARROW1\0\0", "as a table: a Feather file: save it as Parquet or CSV"),
+            (b"TDSm\x0e\0\0\0", "as a table: a TDMS file of LabVIEW: export it as .lvm or CSV"),
+            (b"\x80\x05\x95", "as CSV: a binary file: export it as CSV, .xlsx, Parquet or MAT"),
+            (b"<?xml version='1.0'?>\n", "as CSV: a page in HTML or XML: save it from a spread"),
+            (b'[{"time":0,"value":1},\n', "as CSV: JSON: save it as CSV, a row for each time"),
+        ],
+    )
+    def test_other_files(self, tmp_path, start, told):
+        """Their bytes were read as a text in Windows-1252, and asked for its delimiter."""
+        path = tmp_path / "record.csv"
+        noise = np.random.default_rng(1).integers(0, 256, 5000, np.uint8).tobytes()
+        path.write_bytes(start + noise)
+        assert refused(path).startswith(f"cannot be read {told}")
+
+    def test_archives_and_matrices(self, tmp_path):
+        with zipfile.ZipFile(tmp_path / "a.zip", "w") as packed:
+            packed.writestr("record.csv", HEADER)
+        assert "an archive, but no workbook of Excel" in refused(tmp_path / "a.zip")
+        scipy.io.savemat(tmp_path / "a.mat", {"data": np.ones((9, 3)), "log": {"t": TIME}})
+        assert refused(tmp_path / "a.mat").endswith("but data, log: save each signal as a vector")
 
     def test_only_a_header(self, write):
         told = refused(write([HEADER]))

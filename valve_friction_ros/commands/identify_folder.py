@@ -310,6 +310,15 @@ def print_alarms(rows: Iterable[Mapping[str, Cell]]) -> None:
         console.print(f"       and {len(alarms) - _SHOWN_ALARMS} more")
 
 
+def _newest(rows: Sequence[Mapping[str, Cell]]) -> list[Mapping[str, Cell]]:
+    """Leave out the records of a tag that a later one has overtaken."""
+    last: dict[str, str] = {}
+    for row in rows:
+        tag = str(row["valve"])
+        last[tag] = max(last.get(tag, ""), str(row["began"] or ""))
+    return [row for row in rows if not row["began"] or row["began"] == last[str(row["valve"])]]
+
+
 def _require_sense(options: argparse.Namespace) -> None:
     """Refuse at once options that every recording would refuse."""
     jobs, history, plant, first = options.jobs, options.history, options.plant, options.output[0]
@@ -469,7 +478,7 @@ def _run(options: argparse.Namespace, plans: Mapping[str, Plan], share_out: Shar
             return stop.exit_code
     counted, rows = tally(mine), [row for entry in mine for row in entry.rows]
     print_tally(counted)
-    print_alarms(rows)
+    print_alarms(rows if options.plant is None else _newest(rows))
     refused = counted.outcomes[REFUSED]
     if refused == counted.outcomes.total():
         return ExitCode.REFUSED

@@ -29,6 +29,7 @@ from valve_friction_ros.commands.console import plain_console
 from valve_friction_ros.commands.process import ExitCode, complain
 from valve_friction_ros.identification import plain
 from valve_friction_ros.outside_text import printable
+from valve_friction_ros.records.bags.topics import is_bag
 from valve_friction_ros.records.layout import Layout
 from valve_friction_ros.records.table import OpenTables, ReadSignal
 from valve_friction_ros.streams import utc_second
@@ -131,6 +132,11 @@ def run(options: argparse.Namespace) -> int:
     """Print what would be read; open questions give a line on stderr and exit code 2."""
     description = valve_of(options)
     reading = reading_options(options, description.columns if description else None)
+    if is_bag(options.file):
+        raise ValueError(
+            f"{options.file}: a bag, not a table: `ros2 bag info` lists its topics, and `identify` "
+            "reads it"
+        )
     with reading_progress():
         table = OpenTables((options.file, *reading.beside), reading.columns)
         layout = table.layout

@@ -44,7 +44,7 @@ from valve_friction_ros.planning.steps import (
 )
 from valve_friction_ros.records.files import write_whole
 from valve_friction_ros.records.units import POSITION_UNITS, PRESSURE_UNITS, span
-from valve_friction_ros.records.valve_file import read_valve_file
+from valve_friction_ros.records.valve_file import ValveFile, read_valve_file
 from valve_friction_ros.wording import number_and_width
 
 _NAMES = (
@@ -230,9 +230,8 @@ def _units(options: argparse.Namespace) -> tuple[ShownUnit, ShownUnit]:
     )
 
 
-def _planned(options: argparse.Namespace) -> StrokePlan:
-    """Read the files, and search for the test, with a progress bar on a terminal."""
-    described = read_valve_file(options.valve, options.valve_name)
+def _planned(options: argparse.Namespace, described: ValveFile) -> StrokePlan:
+    """Search for the test, with a progress bar on a terminal."""
     frictions = frictions_from(options, described)
     given = {one.name: vars(options).get(one.name, one.default) for one in fields(Limits)}
     conditions = Conditions(
@@ -262,7 +261,8 @@ def run(options: argparse.Namespace) -> int:
         if path.exists() and not options.replace:
             raise ValueError(f"{path}: it exists already: give another name, or --replace")
     require_outputs(*files, picture=options.figure)
-    plan = _planned(options)
+    described = read_valve_file(options.valve, options.valve_name)
+    plan = _planned(options, described)
     signal = span(options.signal_range, PRESSURE_UNITS) if options.signal_range else None
     texts = {}
     if options.table is not None or options.form is not None:
@@ -270,7 +270,7 @@ def run(options: argparse.Namespace) -> int:
         units = _units(options)
         texts = {
             options.table: table_of(steps, plan, *units),
-            options.form: form_of(steps, plan, options.valve_name or "", *units),
+            options.form: form_of(steps, plan, described.tag or options.valve_name or "", *units),
         }
     write_test(options.output, plan)
     for path, text in texts.items():

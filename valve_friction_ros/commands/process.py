@@ -125,10 +125,10 @@ def _repeat_if_importing() -> None:
         frame = frame.f_back
 
 
-def _interrupt(number: int, frame: FrameType | None) -> None:
+def _interrupt(number: int, _: FrameType | None) -> None:
     _came.append(number)
     threading.Timer(_REPEAT, _repeat_if_importing).start()
-    signal.default_int_handler(number, frame)
+    raise KeyboardInterrupt  # pandas passes on an object only; the default handler sets none
 
 
 def _interrupt_again(unraisable: "sys.UnraisableHookArgs") -> None:

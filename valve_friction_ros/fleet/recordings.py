@@ -50,7 +50,7 @@ _STORAGE = (".mcap", ".db3")
 _TABLES = (".csv", ".tsv", ".xlsx", ".xlsm", ".parquet", ".txt", ".lvm", ".dat", ".mat")
 _PERHAPS = (".txt", ".dat")
 """Ambiguous endings: such a file is a table if some of its first lines hold two numbers."""
-_TWO_NUMBERS = re.compile(rb"^[^\n]*\d[\t;,| ][^\n]*\d", re.MULTILINE)
+_TWO_NUMBERS = re.compile(rb"^[^\n]*\d[Z\"]?[\t;,| ][^\n]*\d", re.MULTILINE)
 _LOOKED_AT, _FEWEST_ROWS = 16_384, 3
 """Bytes of such a file that are examined, and least rows of a table."""
 _ENDINGS = (*_TABLES, ".bag", *_STORAGE)

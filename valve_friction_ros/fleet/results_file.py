@@ -288,7 +288,10 @@ def page_text(rows: Iterable[_Row], name: str, zone: str = "") -> str:
     `ranked`, and by any column at a click.
     """
     lines = [_line(row, zone) for row in ranked(rows)]
-    valves = len({line["name"] for line in lines})
+    tagged = {line["name"] for line in lines if line["recording"]}
+    others = [line for line in lines if not line["recording"]]
+    # beside tags, a refused recording without one is no further valve
+    valves = len(tagged) + sum(not tagged or one["status"].word != "refused" for one in others)
     subject = "1 valve" if valves == 1 else f"{valves} valves"
     if valves < len(lines):
         subject += f" in {len(lines)} recordings"

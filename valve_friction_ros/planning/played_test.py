@@ -178,9 +178,11 @@ class PlayedTest:
         """
         if self.phase is PlayPhase.PLAYING:
             raise RefusalError("the test is running: stop it first")
+        before = self._told
         doubt = self._doubt(now)
         if doubt is not None:
-            raise RefusalError(f"no pressure is set: {self._words(doubt)}")
+            words, self._told = self._words(doubt), before  # the last return keeps its numbers
+            raise RefusalError(f"nothing is played: {words}")
         self.phase, self.aborted, self._pending = PlayPhase.PLAYING, None, None
         self._begun = self._stepped = now
 

@@ -36,7 +36,6 @@ from valve_friction_ros.model.simulation import simulate
 from valve_friction_ros.model.valve import KarnoppParameters, Valve
 from valve_friction_ros.planning.conditions import AIMS, Conditions, Limits
 from valve_friction_ros.planning.stroke_test import (
-    LEAST_STROKE,
     SHAPES,
     FrictionRange,
     Pattern,
@@ -44,8 +43,8 @@ from valve_friction_ros.planning.stroke_test import (
     StrokeTest,
     frictionless_reach,
     pressure_band,
-    stroke,
     stroke_test,
+    strokes,
 )
 
 _MOST_SAMPLES = 12_000
@@ -403,7 +402,7 @@ def _resting(plan: StrokePlan) -> Iterator[str]:
     for name, one, draw in zip(
         plan.frictions.names, plan.forecasts, plan.frictions.draws, strict=True
     ):
-        if stroke(plan.valve, draw, plan.band) < LEAST_STROKE * plan.valve.travel:
+        if not strokes(plan.valve, draw, plan.band):
             yield (
                 f"a friction {name} (F_s {draw.static_friction:.4g} N) may hold the stem: if the "
                 "stem does not move, friction has grown at least to this value; widen the part of "

@@ -202,7 +202,8 @@ def form_of(
         "",
         "ABORT    and go back slowly to the signal before the test, if",
         f"         the stem is below {100 * low:.0f} % ({lowest} {of_stem}) or above "
-        f"{100 * high:.0f} % ({highest} {of_stem}) of the travel,",
+        f"{100 * high:.0f} % ({highest} {of_stem}) of the travel, counted from its end "
+        "without air,",
         f"         the pressure is below {pressure.shown(band.low - PRESSURE_MARGIN, 2)} or above "
         f"{pressure.shown(band.high + PRESSURE_MARGIN, 2)} {of_air},",
         f"         the stem has not moved after {_clock(_first_return(steps))} (min:s),",

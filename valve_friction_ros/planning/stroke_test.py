@@ -189,6 +189,11 @@ def stroke(valve: Valve, one: KarnoppParameters, band: PressureBand) -> float:
     return (span - 2 * one.coulomb_friction) / one.spring_constant
 
 
+def strokes(valve: Valve, one: KarnoppParameters, band: PressureBand) -> bool:
+    """Return whether a reversal within a band moves the stem by the least stroke, as rounded."""
+    return stroke(valve, one, band) >= LEAST_STROKE * valve.travel * (1 - 1e-9)
+
+
 def frictionless_reach(
     valve: Valve, frictions: FrictionRange, band: PressureBand
 ) -> tuple[float, float]:
@@ -254,9 +259,9 @@ def _require_strokes(
 ) -> None:
     """Refuse a band in which the most likely valve does not move far enough."""
     likely = frictions.draws[frictions.middle]
-    least = LEAST_STROKE * valve.travel
-    if stroke(valve, likely, band) >= least:
+    if strokes(valve, likely, band):
         return
+    least = LEAST_STROKE * valve.travel
     force = max(
         2 * likely.static_friction,
         2 * likely.coulomb_friction + likely.spring_constant * least,

@@ -47,6 +47,10 @@ _SHORTEST = 2_000_000_000
 of that many seconds shows no friction."""
 _MOST_REPEATED = 0.5
 """Largest share of rows that may repeat the previous row exactly. Chosen."""
+_DROPOUT = "dropout to 0"
+_LEAST_FALL = 5.0
+"""A single 0 is a dropout if the signal falls to it by this many times the change around it, and
+the steps elsewhere: neither stem nor actuator moves so for one sample. Chosen."""
 
 
 @dataclass(eq=False)
@@ -72,7 +76,7 @@ class ReadSignal:
     bad: Counter[str] = field(default_factory=Counter)
     example: tuple[int, str, str] = (0, "", "")
 
-    def where(self, kept: NDArray[np.bool_] | slice) -> "ReadSignal":
+    def where(self, kept: "NDArray[np.bool_ | np.int64] | slice") -> "ReadSignal":
         """Return the selected samples."""
         return replace(
             self, stamps=self.stamps[kept], values=self.values[kept], rows=self.rows[kept]
@@ -144,7 +148,8 @@ class _Reader:
             raise RefusalError(
                 f"{self.path}: the chosen stretch holds no rows: choose another begin or end"
             )
-        return [self._in_order(each) for each in found]
+        found = [self._in_order(each) for each in found]
+        return found if self.layout.is_own else [*map(_without_dropouts, found)]
 
     def _blocks(
         self, signals: Sequence[TableSignal]
@@ -302,6 +307,26 @@ class _Reader:
             )
         place = f"row {read.rows[sample]}, column {column!r}"
         return f"{self.path}: {place} {what} ({now} after {before}): {remedy}"
+
+
+def _without_dropouts(read: ReadSignal) -> ReadSignal:
+    """Leave out single zeros that a signal falls to for one sample, as without connection."""
+    values = read.values
+    is_zero = values == 0
+    if values.size < 3 or not is_zero.any():
+        return read
+    before, after = values[:-2], values[2:]
+    fall = np.minimum(np.abs(before), np.abs(after))
+    lone = is_zero[1:-1] & (before * after > 0) & (fall > _LEAST_FALL * np.abs(after - before))
+    steps = np.abs(np.diff(values))[~(is_zero[1:] | is_zero[:-1])]
+    lone &= fall > _LEAST_FALL * (np.quantile(steps, 0.99) if steps.size else 0.0)
+    places = np.flatnonzero(lone) + 1
+    if not places.size:
+        return read
+    read.bad[_DROPOUT] += places.size
+    if not read.example[0]:
+        read.example = (int(read.rows[places[0]]), read.signal.name, _DROPOUT)
+    return read.where(np.delete(np.arange(values.size), places))
 
 
 def layout_of(path: Path, form: Columns, is_part: bool = False) -> Layout:

@@ -22,6 +22,7 @@ import importlib
 import io
 import itertools
 import math
+import re
 import shutil
 import stat
 import sys
@@ -316,6 +317,13 @@ def _text(path: Path, form: Columns, encoding: str) -> io.TextIOWrapper:
     return io.TextIOWrapper(stream, encoding, "strict" if form.encoding else "replace")
 
 
+_PAGE = re.compile(r"\s*<(\?xml|!doctype|html|table)\b", re.IGNORECASE)
+_JSON = re.compile(r'\s*(\{\s*"|\[\s*[\[{])')
+_CONTROL = re.compile(r"[\x01-\x08\x0e-\x19]")
+"""Control characters that no text needs; zeros fill the end of some loggers' files."""
+_MOST_CONTROL = 0.01
+"""Largest share of these in a text. Chosen."""
+
 _ZIP = b"PK\x03\x04"
 
 
@@ -343,10 +351,22 @@ def open_raw(path: Path, form: Columns) -> RawTable:
                 encoding = form.encoding or encoding_of(stream.peek(_PIECE)[:_PIECE])
             with _text(place, form, encoding) as text:
                 head = tuple(itertools.islice(text, LOOKED_AT))
+            _require_table(head)
             table = RawTable(path, form, place, head, encoding=encoding)
     if not any(line.strip() for line in table.head) and not any(map(any, table.cells)):
         raise ValueError(f"{path}: the file is empty")
     return table
+
+
+def _require_table(head: Sequence[str]) -> None:
+    """Refuse the first lines of a file that is text in another form, or no text."""
+    start = "".join(head)[:_PIECE]
+    if _PAGE.match(start):
+        raise ValueError("a page in HTML or XML: save it from a spreadsheet as .xlsx or CSV")
+    if _JSON.match(start):
+        raise ValueError("JSON: save it as CSV, a row for each time")
+    if len(_CONTROL.findall(start)) > _MOST_CONTROL * len(start):
+        raise ValueError("a binary file: export it as CSV, .xlsx, Parquet or MAT (version 7)")
 
 
 def _looked_at(path: Path, form: Columns, place: Path) -> RawTable:
@@ -389,6 +409,8 @@ def _excel(path: Path, form: Columns, places: Sequence[int] | None) -> Iterator[
 
     openpyxl = _library("openpyxl")
     with zipfile.ZipFile(path) as packed:
+        if "[Content_Types].xml" not in packed.namelist():
+            raise ValueError("an archive, but no workbook of Excel: unpack it, or save it as .xlsx")
         size = sum(each.file_size for each in packed.infolist()) / 1e6
     if size > form.maximum_megabytes:
         raise ValueError(
@@ -436,18 +458,29 @@ def _matlab(path: Path, form: Columns, places: Sequence[int] | None) -> Iterator
         if isinstance(values, np.ndarray) and values.ndim == 1 and values.dtype.kind in "fiu"
     }
     longest = max((each.size for each in vectors.values()), default=0)
+    if not longest:
+        others = ", ".join(name for name in found if not name.startswith("__")) or "nothing"
+        raise ValueError(f"no vectors of numbers, but {others}: save each signal as a vector")
     frame = pd.DataFrame({name: v for name, v in vectors.items() if v.size == longest})
     yield frame if places is None else frame.iloc[:, list(places)]
 
 
-def _old_excel(*_: object) -> Iterator["pd.DataFrame"]:
-    raise ValueError("a workbook of Excel before 2007: save it as .xlsx or CSV")
+def _unread(what: str, *_: object) -> Iterator["pd.DataFrame"]:
+    raise ValueError(what)
 
 
 _READERS: Mapping[bytes, Callable[..., Iterator["pd.DataFrame"]]] = {
     _ZIP: _excel,
     b"PAR1": _parquet,
     b"MATL": _matlab,
-    b"\xd0\xcf\x11\xe0": _old_excel,
+    **{
+        start: functools.partial(_unread, what)
+        for start, what in (
+            (b"\xd0\xcf\x11\xe0", "a workbook of Excel before 2007: save it as .xlsx or CSV"),
+            (b"\x89HDF", "an HDF5 file: save it as Parquet or CSV"),
+            (b"ARRO", "a Feather file: save it as Parquet or CSV"),
+            (b"TDSm", "a TDMS file of LabVIEW: export it as .lvm or CSV"),
+        )
+    },
 }
-"""Readers of files of cells, by their first bytes."""
+"""Readers of files of cells, and what others are, by their first bytes."""

@@ -94,6 +94,8 @@ class ValveFile:
         ``timing_uncertainty`` or ``fixed.mass``.
     survey : mapping of str to object
         The given settings of a first survey, such as ``packing``.
+    tag : str
+        The tag, ``valve_tag``; empty if it is not given.
     assumed : tuple of str
         Fields of the valve that affect forces and that the file does not state.
     """
@@ -104,6 +106,7 @@ class ValveFile:
     settings: MappingProxyType[str, Any] = field(default_factory=lambda: MappingProxyType({}))
     assumed: tuple[str, ...] = ()
     survey: MappingProxyType[str, Any] = field(default_factory=lambda: MappingProxyType({}))
+    tag: str = ""
 
     @property
     def stated(self) -> dict[str, float]:
@@ -233,7 +236,8 @@ def _described(values: Mapping[str, Any]) -> ValveFile:
     require_valve_units(valve, known)
     assumed = tuple(name for name in ("pressure_reference",) if name not in values)
     survey = {each.name: _read(each, values[each.name]) for each in SURVEY if each.name in values}
-    return ValveFile(valve, frozen(known), columns, frozen(settings), assumed, frozen(survey))
+    tag = str(values.get("valve_tag") or "")
+    return ValveFile(valve, frozen(known), columns, frozen(settings), assumed, frozen(survey), tag)
 
 
 def read_valve_file(path: str | os.PathLike[str], valve: str | None = None) -> ValveFile:
