@@ -343,7 +343,8 @@ class Identifier(ManagedNode):
         self._schedule.follow()
 
     def _on_time_jump(self, jump: TimeJump) -> None:
-        cause = said(Code.TIME_JUMPED, seconds=jump.delta.nanoseconds / 1e9)
+        seconds = jump.delta.nanoseconds / 1e9
+        cause = said(Code.TIME_JUMPED, seconds=seconds) if seconds else said(Code.CLOCK_CHANGED)
         self._inputs.take(is_all=True)
         self._monitor.buffer.clear(cause)
         self._quality.forget_stamps()
