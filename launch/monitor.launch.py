@@ -217,7 +217,7 @@ ARGUMENTS = {
     ),
     "reliability": (
         "auto",
-        "Of the inputs: auto takes what is published.",
+        "Of the inputs: best_effort never holds up a publisher; the others take what is published.",
         ["auto", "reliable", "best_effort"],
     ),
 }
