@@ -75,7 +75,10 @@ class _Resting:
         elif scope["type"] == "websocket":
             await send({"type": "websocket.close", "code": 1013})
         else:
-            words = "The dashboard is inactive: `ros2 lifecycle set` its node to active."
+            words = (
+                "The dashboard is inactive: configure and activate its node with "
+                "`ros2 lifecycle set`."
+            )
             await Response(words, 503, media_type="text/plain")(scope, receive, send)
 
 
