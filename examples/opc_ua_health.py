@@ -17,6 +17,7 @@ import asyncio
 import contextlib
 import math
 import re
+import sys
 import threading
 import time
 from collections.abc import Iterable
@@ -91,7 +92,7 @@ class Valve:
         """Show a status of ``/diagnostics``; a value that it no longer holds is unknown."""
         self._shown.clear()
         values = {entry.key: entry.value for entry in status.values}
-        health = _value(SIGNALS.index(values.get("NE 107", "")), ua.VariantType.Int32)
+        health = _value(SIGNALS.index(values["NE 107"]), ua.VariantType.Int32)
         enumeration = ua.NodeId(ENUMERATION, self._di)
         await self._put("DeviceHealth", self._root, health, space=self._di, data_type=enumeration)
         await self._put("Message", self._root, _value(status.message, ua.VariantType.String))
@@ -161,7 +162,8 @@ class HealthGateway(Node):
 
     def _hear(self, message: DiagnosticArray) -> None:
         for status in message.status:
-            if status.name.endswith(": friction"):
+            values = {entry.key: entry.value for entry in status.values}
+            if status.name.endswith(": friction") and values.get("NE 107") in SIGNALS:
                 tag = status.hardware_id or status.name.removesuffix("/identifier: friction")
                 self._heard[tag] = time.monotonic(), status
 
@@ -210,7 +212,11 @@ if __name__ == "__main__":
     gateway = HealthGateway()
     listener = threading.Thread(target=_listen, args=(gateway,))
     listener.start()
-    with contextlib.suppress(KeyboardInterrupt):
-        asyncio.run(gateway.serve())
-    rclpy.shutdown()
-    listener.join()
+    try:
+        with contextlib.suppress(KeyboardInterrupt):
+            asyncio.run(gateway.serve())
+    except OSError as error:
+        sys.exit(f"cannot serve: {error}")
+    finally:
+        rclpy.shutdown()
+        listener.join()

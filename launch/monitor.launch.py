@@ -36,6 +36,7 @@ from valve_friction_ros.outside_text import nearest, resembling
 
 PACKAGE = "valve_friction_ros"
 NAMESPACE = re.compile(r"/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
+TOPIC = re.compile("~?" + NAMESPACE.pattern, re.ASCII)
 INPUTS = {"pressure_topic": "actuator_pressure", "stem_topic": "stem_state"}
 """Arguments, and keys of a file of valves, with the name that each remaps."""
 
@@ -59,43 +60,57 @@ class PlantValve(NamedTuple):
         return {f"qos_overrides.{name}.subscription.reliability": reliability for name in names}
 
 
-def listed(text: str) -> dict[str, Any]:
+def listed(text: str) -> list[tuple[str, Any]]:
     """Return the valves of a list, or of a YAML file, with what the file says of each."""
     if not text.endswith((".yaml", ".yml")):
-        names = text.replace(",", " ").split()
-        found: Any = names
+        found: Any = text.replace(",", " ").split()
     else:
         if not Path(text).is_file():
             raise ValueError(f"valves '{text}' is no file: give its path, or a list of valves")
-        found = yaml.safe_load(Path(text).read_text(encoding="utf-8")) or []
-        names = list(found)
-    if not names:
+        try:
+            found = yaml.safe_load(Path(text).read_text(encoding="utf-8")) or []
+        except (yaml.YAMLError, UnicodeDecodeError) as error:
+            reason = " ".join(str(error).split())
+            raise ValueError(f"valves '{text}' cannot be read as YAML: {reason}") from None
+        if not isinstance(found, list | dict):
+            raise ValueError(f"valves '{text}' holds no valves: write a line such as 'fv_101:'")
+    if not found:
         raise ValueError("no valve given: name at least one, as in valves:=fv_101,fv_102")
-    repeated = sorted({str(name) for name in names if names.count(name) > 1})
-    if repeated:
-        raise ValueError(f"valve '{repeated[0]}' is listed twice: name each valve once")
-    return {str(name): (found[name] if isinstance(found, dict) else None) or {} for name in names}
+    if isinstance(found, dict):
+        return [(str(name), topics or {}) for name, topics in found.items()]
+    return [(str(name), {}) for name in found]
 
 
 def plant_valves(text: str, usual: dict[str, str]) -> list[PlantValve]:
-    """Read the valves; ``{valve}`` in a usual topic stands for the valve's name."""
-    valves = []
-    for name, given in listed(text).items():
+    """Read the valves; ``{valve}`` in a topic stands for the valve's name."""
+    valves: dict[str, PlantValve] = {}
+    for name, given in listed(text):
         if not NAMESPACE.fullmatch(name):
             raise ValueError(
                 f"valve '{name}' is no ROS namespace: use letters, digits and underscores, "
                 "as in valves:=fv_101,fv_102"
             )
-        unknown = sorted(set(given) - set(INPUTS))
-        if unknown:
+        if not isinstance(given, dict) or (unknown := sorted(map(str, set(given) - set(INPUTS)))):
+            what = f"the unknown key '{unknown[0]}'" if isinstance(given, dict) else f"'{given}'"
             raise ValueError(
-                f"valve '{name}' has the unknown key '{unknown[0]}': use {' and '.join(INPUTS)}; "
+                f"valve '{name}' has {what}: use {' and '.join(INPUTS)}; "
                 "parameters of one valve stand in the config"
             )
         place = name.strip("/")
-        topics = {key: topic.replace("{valve}", place) for key, topic in usual.items()}
-        valves.append(PlantValve(f"/{place}", {**topics, **given}))
-    return valves
+        topics = {
+            key: str("" if topic is None else topic).replace("{valve}", place)
+            for key, topic in {**usual, **given}.items()
+        }
+        for key, topic in topics.items():
+            if not TOPIC.fullmatch(topic):
+                raise ValueError(
+                    f"{key} '{topic}' of valve '{name}' is no topic: use letters, digits, "
+                    "underscores and slashes, and {valve} for the name of the valve"
+                )
+        if f"/{place}" in valves:
+            raise ValueError(f"valve '{name}' is listed twice: name each valve once")
+        valves[f"/{place}"] = PlantValve(f"/{place}", topics)
+    return list(valves.values())
 
 
 def require_known(context: LaunchContext) -> None:
@@ -202,7 +217,7 @@ ARGUMENTS = {
     ),
     "reliability": (
         "auto",
-        "Of the inputs: auto takes what is published.",
+        "Of the inputs: best_effort never holds up a publisher; the others take what is published.",
         ["auto", "reliable", "best_effort"],
     ),
 }

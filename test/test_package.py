@@ -359,6 +359,7 @@ def test_the_dashboard_is_started_on_request(monitor, asked, started):
     [
         ("", "no valve given"),
         ("fv_101 fv_101", "'fv_101' is listed twice"),
+        ("fv_101,/fv_101", "'/fv_101' is listed twice"),
         ("fv-101", "'fv-101' is no ROS namespace"),
         ("missing.yaml", "'missing.yaml' is no file"),
     ],
@@ -368,10 +369,23 @@ def test_wrong_lists_of_valves(monitor, text, words):
         monitor.plant_valves(text, USUAL)
 
 
-def test_an_unknown_key_of_a_valve(monitor, tmp_path):
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ("fv_101: {topic: /x101}", "unknown key 'topic': use pressure_topic and stem_topic"),
+        ("fv_101: /x101", "'fv_101' has '/x101': use pressure_topic and stem_topic"),
+        ("fv_101: 5", "'fv_101' has '5': use pressure_topic and stem_topic"),
+        ("fv_101: {stem_topic: }", "stem_topic '' of valve 'fv_101' is no topic"),
+        ("fv_101: {stem_topic: '/{tag}/x'}", "stem_topic '/{tag}/x' of valve 'fv_101' is no topic"),
+        ("fv_101", "holds no valves: write a line such as 'fv_101:'"),
+        ("fv_101: {stem_topic: /x", "cannot be read as YAML: while parsing a flow mapping in"),
+    ],
+)
+def test_wrong_files_of_valves(monitor, tmp_path, content, words):
+    """Each is refused before a process starts, which would end and be started again for ever."""
     file = tmp_path / "plant.yaml"
-    file.write_text("fv_101: {topic: /x101}")
-    with pytest.raises(ValueError, match="unknown key 'topic': use pressure_topic and stem_topic"):
+    file.write_text(content)
+    with pytest.raises(ValueError, match=re.escape(words)):
         monitor.plant_valves(str(file), USUAL)
 
 

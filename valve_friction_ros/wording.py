@@ -189,6 +189,7 @@ class Code(Enum):
     CLEARED_AS_STAMPS_GO_BACK = "time stamps go backwards: the buffer is cleared"
     STAMPS_WENT_BACK = "the time stamps of {signal} jumped back by {seconds:.3g} s"
     TIME_JUMPED = "ROS time jumped by {seconds:.3g} s"
+    CLOCK_CHANGED = "use_sim_time was changed"
     TIME_JUMPS = "ROS time jumps"
     SAMPLE_DAMAGED = "{signal} is damaged"
     SAMPLE_NO_JOINT = "{signal} has no position for the joint"

@@ -12,7 +12,9 @@
 import contextlib
 import importlib.metadata
 import re
+import socket
 import threading
+import time
 import urllib.error
 import urllib.request
 
@@ -243,6 +245,29 @@ def test_a_transition_that_the_state_does_not_have_is_refused(live, compose, kin
         assert not change(client, Transition.TRANSITION_CONFIGURE)
         assert state(client) == State.PRIMARY_STATE_INACTIVE
     assert not node.failures
+
+
+def test_a_configuration_that_waits_for_a_server_lets_the_executor_continue(
+    live, compose, tmp_path
+):
+    """The server accepts a connection and never says anything."""
+    pytest.importorskip("psycopg", reason="run `make venv-database`")
+    client, turns = live.client, []
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        url = f"postgresql://me@127.0.0.1:{silent.getsockname()[1]}/valves?connect_timeout=4"
+        node = compose(
+            lifecycle=True, history_url=url, history_file=str(tmp_path / "history.sqlite")
+        )
+        other = rclpy.create_node("other", context=compose.context)
+        other.create_timer(0.02, lambda: turns.append(time.monotonic()))
+        executor = SingleThreadedExecutor(context=compose.context)
+        executor.add_node(other)
+        with spun(node, executor):
+            begun = time.monotonic()
+            assert change(client, Transition.TRANSITION_CONFIGURE)
+            assert time.monotonic() - begun > 3.5
+        assert sum(one > begun for one in turns) > 20
+        other.destroy_node()
 
 
 def test_a_wrong_parameter_leaves_the_node_unconfigured(live, compose):

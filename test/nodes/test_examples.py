@@ -466,7 +466,12 @@ def test_each_signal_of_ne_107_and_each_verdict(live, served):
         return DiagnosticStatus(name=name, hardware_id=f"V-{signal}", values=pairs)
 
     def heard():
-        others = [DiagnosticStatus(name="another node: friction less", hardware_id="X")]
+        door = [KeyValue(key="NE 107", value="worn"), KeyValue(key="torque", value="5")]
+        others = [
+            DiagnosticStatus(name="another node: friction less", hardware_id="X"),
+            DiagnosticStatus(name="hinge: friction", hardware_id="X", values=door),
+            DiagnosticStatus(name="hinge: friction", hardware_id="X", level=b"\x02"),
+        ]
         publisher.publish(DiagnosticArray(status=[*map(status, expected), *others]))
         return served.read("V-M", f"{served.di}:DeviceHealth")
 

@@ -14,6 +14,7 @@ import signal
 import socket
 import subprocess
 import sys
+import time
 
 import pytest
 import yaml
@@ -175,13 +176,17 @@ def test_a_dashboard_without_nicegui_says_what_to_install(ended, tmp_path):
     ]
 
 
-def test_sigterm_ends_a_dashboard_cleanly(live):
+@pytest.mark.parametrize("requests", [[signal.SIGTERM], [signal.SIGINT, signal.SIGINT]])
+def test_requests_to_stop_end_a_dashboard_cleanly(live, requests):
+    """The second one, such as that of `ros2 launch` without a terminal, ends it at once."""
     pytest.importorskip("nicegui", reason="NiceGUI is not installed")
     process = live.start("dashboard", {"port": free_port()}, namespace=None)
     live.client.wait_until(lambda: "ready: open" in process.errors + process.output, "the server")
     live.client.watched.clear()
     live.nodes.remove(process)
-    process._process.terminate()
+    for number in requests:
+        process._process.send_signal(number)
+        time.sleep(0.02)  # until the signal is handled, a second one is the same
     process.require_good_end()
 
 

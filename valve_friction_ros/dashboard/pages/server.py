@@ -51,11 +51,15 @@ def require_free(host: str, port: int) -> None:
 
 
 class _Gone(logging.Filter):
-    """Drops the error that Starlette logs when a browser leaves before its page is ready."""
+    """Drops the errors logged when a browser leaves before its page is ready, and at a hasty end.
+
+    A second request to stop, such as that of ``ros2 launch`` without a terminal, cancels the end.
+    """
 
     def filter(self, record: logging.LogRecord) -> bool:
         error = record.exc_info[1] if record.exc_info else None
-        return str(error) != "No response returned."
+        is_hasty = record.getMessage().rstrip().endswith("asyncio.exceptions.CancelledError")
+        return str(error) != "No response returned." and not is_hasty
 
 
 def guarded(access: Access, log: Callable[[str], None]) -> Guard:
@@ -75,7 +79,10 @@ class _Resting:
         elif scope["type"] == "websocket":
             await send({"type": "websocket.close", "code": 1013})
         else:
-            words = "The dashboard is inactive: `ros2 lifecycle set` its node to active."
+            words = (
+                "The dashboard is inactive: configure and activate its node with "
+                "`ros2 lifecycle set`."
+            )
             await Response(words, 503, media_type="text/plain")(scope, receive, send)
 
 

@@ -66,6 +66,12 @@ _SURE = 8
 """Number of successive moves that prove that the clock was ahead before. A clock that is wrong
 after a start is set sooner than that."""
 
+_CLOCKS = (
+    "check the clocks of the sensors and of this machine; to play a recording, set use_sim_time "
+    "and a separate history_file"
+)
+"""What to do about stamps that cannot be right."""
+
 
 @dataclass(eq=False)
 class _Batch:
@@ -139,8 +145,7 @@ class MoveLedger:
             return ""
         return (
             f"the latest {self._left_in_a_row} moves in service are left out of the evidence "
-            f"because their time stamps are {self._problem}: check the clocks of the sensors and "
-            "of this machine, and use a separate history_file when playing a recording"
+            f"because their time stamps are {self._problem}: {_CLOCKS}"
         )
 
     def _drop_those_ahead(self) -> None:
@@ -167,8 +172,7 @@ class MoveLedger:
         if self.left_out == 1:
             self._node.get_logger().warning(
                 "a move in service is left out of the evidence because its time stamps are "
-                f"{problem} (counted in evidence left_out): check the clocks of the sensors and "
-                "of this machine, or set use_sim_time when playing a recording"
+                f"{problem} (counted in evidence left_out): {_CLOCKS}"
             )
 
     def refer(self, evidence: Evidence) -> None:

@@ -139,6 +139,19 @@ def _sender_of(node: Node, file: "HistoryFile | None") -> "Sender | None":
     return database.sender_of(file.path, server)
 
 
+def sender_with_rows(node: Node, tag: str) -> "Sender | None":
+    """Take the rows of the valve from the server, if one is named; return what sends the history.
+
+    The caller ends it. Raises ValueError for a wrong parameter, HistoryError for a wrong file.
+    """
+    file = _file_of(node)
+    sender = _sender_of(node, file)
+    if file is not None and sender is not None:
+        file.prepare()
+        sender.take(KeptValve(node.get_fully_qualified_name(), tag))
+    return sender
+
+
 def _identity_of(path: Path) -> tuple[int, int] | None:
     """Return what a file that replaces this one does not share, or None without a file."""
     try:

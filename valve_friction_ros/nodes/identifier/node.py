@@ -9,6 +9,7 @@
 
 """Node `identifier`: watches one valve and identifies its friction on demand."""
 
+import contextlib
 import math
 import sys
 import time
@@ -36,12 +37,13 @@ from valve_friction_ros.health import (
     by_severity,
 )
 from valve_friction_ros.health.measured import DIFFERENCES
+from valve_friction_ros.history import HistoryError
 from valve_friction_ros.identification import STATED, RefusalError, require_valve_units
 from valve_friction_ros.nodes.identifier.alarm_board import AlarmBoard
 from valve_friction_ros.nodes.identifier.alerts import Alerts, FaultLog, LevelLog, webhook_from
 from valve_friction_ros.nodes.identifier.baseline_in_force import BaselineInForce, baseline_from
 from valve_friction_ros.nodes.identifier.evidence_watch import EvidenceWatch
-from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
+from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter, sender_with_rows
 from valve_friction_ros.nodes.identifier.recordings import AlarmRecorder, BagSaver, ReportWriter
 from valve_friction_ros.nodes.identifier.response_watch import ResponseWatch, StandstillWatch
 from valve_friction_ros.nodes.identifier.status import (
@@ -202,6 +204,12 @@ class Identifier(ManagedNode):
         self._tag = self.get_parameter("valve_tag").value or self.get_namespace().strip("/")
         self.begin()
 
+    def await_others(self) -> None:
+        """Take the rows of the valve from the server, which may be away, before `configure`."""
+        with contextlib.suppress(ValueError, HistoryError):  # `configure` tells them
+            if (sender := sender_with_rows(self, self._tag)) is not None:
+                self.opened.callback(sender.end)
+
     def configure(self) -> None:
         """Create all parts that monitor the valve, from the parameters."""
         workers = self._shared_workers or self.opened.enter_context(running_workers())
@@ -343,7 +351,8 @@ class Identifier(ManagedNode):
         self._schedule.follow()
 
     def _on_time_jump(self, jump: TimeJump) -> None:
-        cause = said(Code.TIME_JUMPED, seconds=jump.delta.nanoseconds / 1e9)
+        seconds = jump.delta.nanoseconds / 1e9
+        cause = said(Code.TIME_JUMPED, seconds=seconds) if seconds else said(Code.CLOCK_CHANGED)
         self._inputs.take(is_all=True)
         self._monitor.buffer.clear(cause)
         self._quality.forget_stamps()

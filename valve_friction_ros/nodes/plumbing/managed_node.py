@@ -17,12 +17,13 @@ import inspect
 from collections.abc import Callable
 from typing import Any
 
+from lifecycle_msgs.msg import Transition
 from rclpy.exceptions import ParameterException
 from rclpy.lifecycle import LifecycleNodeMixin, LifecycleState, TransitionCallbackReturn
 from rclpy.timer import Timer
 
 from valve_friction_ros.nodes.plumbing.polled_node import PolledNode
-from valve_friction_ros.nodes.plumbing.worker import bugs_reported
+from valve_friction_ros.nodes.plumbing.worker import Worker, bugs_reported, done_in
 
 _WRONG = (ParameterException, RuntimeError, ValueError, OSError)
 """Exceptions of a node that cannot be configured with its parameters."""
@@ -68,15 +69,28 @@ class ManagedNode(LifecycleNodeMixin, PolledNode):
         self.is_active = True
 
     def _refusing(self, change: Callable[..., Any]) -> Callable[..., Any]:
-        """Refuse a transition that the state does not have; rclpy would end the executor."""
+        """Refuse a transition that the state does not have; rclpy would end the executor.
 
-        def answered(request: Any, response: Any) -> Any:
+        Before a configuration, a thread waits for what it needs while the executor continues.
+        """
+
+        async def answered(request: Any, response: Any) -> Any:
+            asked = request.transition
+            if asked.label == "configure" or asked.id == Transition.TRANSITION_CONFIGURE:
+                worker = Worker("await")
+                with self.guarded("await"):
+                    await done_in(worker, self.await_others)
+                worker.shutdown(wait=False)
             with contextlib.suppress(RuntimeError):  # RCLError, which is not public
-                return change(request, response)
+                if not self._is_closed:
+                    return change(request, response)
             response.success = False
             return response
 
         return self.exclusive(answered)
+
+    def await_others(self) -> None:
+        """Wait for other machines before `configure`, in a thread; only a life cycle calls this."""
 
     def configure(self) -> None:
         """Create all entities and resources of the node; raises ValueError for wrong parameters."""
