@@ -100,19 +100,6 @@ def test_an_alarm_outlives_a_kill(live):
     assert values_of(status)["estimate_from"] == "this run"
 
 
-def test_an_age_of_days(live, history):
-    """The kept diagnosis is told whatever its age is, and the level as well."""
-    now = live.client.node.get_clock().now().nanoseconds
-    history.add(success(now - 5 * DAY - DAY // 2, 400.0, baseline=None))
-    history.set_baseline(VALVE, KeptBaseline(Baseline(100.0, 1.0), START, START))
-    node = live.start_identifier()
-    status = live.client.next_status()
-    assert status.level == ERROR
-    assert status.message.startswith("excess friction: Coulomb friction is 4.00 (")
-    assert status.message.endswith(" (identified 5 days ago, before the restart)")
-    live.client.wait_until(lambda: "level OK → ERROR: excess" in node.errors, "a logged level")
-
-
 def test_stamps_of_a_time_to_come(live, history, tmp_path):
     """The clock went back while the node was down: the newest counts, and its age is no number."""
     now = live.client.node.get_clock().now().nanoseconds
