@@ -94,6 +94,11 @@ class Live:
         self.client.drain()
         self.client.statuses.clear()
 
+    def restart(self, process, *given, **more):
+        """Kill an identifier, and start it again with these parameters."""
+        self.kill(process)
+        return self.start_identifier(*given, **more)
+
     def close(self):
         """Stop what still runs; every node must end well."""
         self.client.watched.clear()

@@ -306,8 +306,7 @@ def test_it_plays_when_asked_and_goes_back_by_limit_and_by_its_end(stroke_player
     assert not live.client.trigger("start", PLAYER).success  # no signal has come
     wait(live, lambda: live.sent > 50, "send_signals")
     assert last(live) is None  # and nothing begins by itself
-    answer = live.client.trigger("start", PLAYER)
-    assert answer.success, answer.message
+    live.client.success("start", PLAYER)
     wait(live, lambda: last(live) == 1.4e5, "the highest set point")
     values = [one.fluid_pressure for one in live.set_points]
     assert values[0] == HOME
@@ -379,8 +378,7 @@ def test_what_is_reported_is_what_was_promised(live, plan, tmp_path):
     positions = [message.position[0] / BENCH_VALVE.travel for message in heard]
     assert 0.19 < min(positions) < 0.45
     assert 0.55 < max(positions) < 0.81
-    response = live.client.trigger("identify")
-    assert response.success, response.message
+    live.client.success("identify")
     promised = plan.forecasts[-1]
     assert promised.parameters.coulomb_friction == pytest.approx(606.0)
     values, widths = live.client.friction(*NAMES), live.client.half_widths(*NAMES)

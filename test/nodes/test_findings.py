@@ -122,14 +122,11 @@ def test_a_lost_spring_is_said_and_outlives_a_record_that_hardly_shows_it_and_a_
         LOW_FRICTION.spring_constant, 1e-3
     )
 
-    refused = client.trigger("set_baseline")
-    assert not refused.success
-    assert "the spring constant has changed" in refused.message
+    assert "the spring constant has changed" in client.refusal("set_baseline")
 
     client.identified(HARDLY)
     assert "spring_constant" not in history.last_success(NODE).numbers
-    live.kill(node)
-    live.start_identifier()
+    live.restart(node)
     after = client.next_status(lambda one: CHANGE in values_of(one), "the change after a restart")
     for one in (status, after):
         assert one.level == ERROR
@@ -153,17 +150,15 @@ def test_lost_travel_is_said_though_its_record_is_refused(live, history, is_sche
     client.wait_for_buffered(2 * len(lost))
     words = "travel is lost at the lower end: the stem stops +4.57 mm"
     if not is_scheduled:
-        answer = client.trigger("identify")
-        assert not answer.success
-        assert "no friction model reproduces the record" in answer.message
-        assert words in answer.message
+        answer = client.refusal("identify")
+        assert "no friction model reproduces the record" in answer
+        assert words in answer
     status = client.next_status(lambda one: words in one.message, "the lost travel")
     assert (status.level, values_of(status)["NE 107"]) == (WARN, "M")
     assert ("was refused" in status.message) == (not is_scheduled)
     assert float(values_of(status)["lower_stop change [m]"]) == pytest.approx(4.572e-3, abs=5e-5)
     client.wait_until(lambda: history.entries()[-1].refusal, "the refusal in the history")
-    live.kill(node)
-    live.start_identifier()
+    live.restart(node)
     after = client.next_status(lambda one: words in one.message, "the same after a restart")
     assert after.level == WARN
 
@@ -174,9 +169,7 @@ def test_a_restored_baseline_brings_all_its_numbers_back(live):
     client.set_baseline(HEALTHY)
     client.set_baseline(WEAK)
     assert client.next_status(lambda one: one.level == OK, "a new baseline")
-    live.kill(node)
-
-    live.start_identifier({"baseline_in_alarm": True})
+    live.restart(node, {"baseline_in_alarm": True})
     assert client.next_status(lambda one: CHANGE in values_of(one), "the kept one").level == OK
     assert client.trigger("restore_baseline").success
     status = client.next_status(lambda one: one.level == ERROR, "the first baseline")
