@@ -94,10 +94,10 @@ class Live:
         self.client.drain()
         self.client.statuses.clear()
 
-    def restart(self, process, *given, **more):
-        """Kill an identifier, and start it again with these parameters."""
-        self.kill(process)
-        return self.start_identifier(*given, **more)
+    def restart(self, parameters=None):
+        """Kill the node that was started last, and start an identifier with these parameters."""
+        self.kill(self.nodes[-1])
+        return self.start_identifier(parameters)
 
     def close(self):
         """Stop what still runs; every node must end well."""

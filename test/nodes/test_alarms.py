@@ -62,7 +62,7 @@ def test_an_alarm_outlives_a_kill(live):
     client.identified(TIGHT)
     before = client.statuses[-1][1]
     assert before.level == ERROR
-    node = live.restart(node)
+    node = live.restart()
     after = client.next_status()
     assert after.level == ERROR
     (line,) = (one for one in node.errors.splitlines() if "baseline Coulomb friction 152.7" in one)
@@ -139,7 +139,7 @@ def test_a_history_that_goes_while_the_node_runs_costs_no_baseline(live, history
     client.wait_until(lambda: "baseline in force is stored again" in node.errors, "a warning")
     again = history.baseline(VALVE.name)
     assert (again.baseline, again.time) == (kept.baseline, kept.time)
-    live.restart(node)
+    live.restart()
     assert client.next_status().level == ERROR
 
 
@@ -191,8 +191,7 @@ def test_a_node_without_a_history_says_so_and_keeps_nothing(live, history):
 
 
 def test_the_baseline_is_guarded_and_restored(live, history):
-    node = live.start_identifier()
-    client = live.client
+    client = live.client_of_identifier()
     assert client.refusal("restore_baseline").startswith("there is no ~/set_baseline to undo")
     client.identified(HEALTHY)
     assert client.trigger("set_baseline").message == (f"baseline: {OLD}; previous: none{TAKEN}")
@@ -209,7 +208,7 @@ def test_the_baseline_is_guarded_and_restored(live, history):
     assert client.set_together(NODE, {"baseline_in_alarm": True}).successful
     assert client.success("set_baseline") == f"baseline: {NEW}; previous: {OLD}{TAKEN}"
     assert client.next_status().level == OK
-    live.restart(node)  # by its default again
+    live.restart()  # by its default again
     assert client.next_status().level == OK
     assert client.success("restore_baseline") == f"baseline: {OLD}; previous: {NEW}"
     status = client.next_status()
@@ -267,8 +266,7 @@ def test_settings_name_the_alarms():
 
 @pytest.mark.slow
 def test_a_life_of_an_alarm(live, history):
-    node = live.start_identifier(KNOWN)
-    client = live.client
+    client = live.client_of_identifier(KNOWN)
     assert values_of(client.next_status())["alarm friction_high"] == "normal"
     refused = ask(client, "acknowledge")
     assert (refused.success, refused.message) == (
@@ -283,7 +281,7 @@ def test_a_life_of_an_alarm(live, history):
     assert (refused.success, refused.message) == (False, "who is empty: state your name")
     answer = ask(client, "acknowledge", text="repack on Monday")
     assert (answer.success, answer.message) == (True, "friction high: acknowledged")
-    live.restart(node, KNOWN)
+    live.restart(KNOWN)
     state(client, "friction_high", "acknowledged")
     answer = ask(client, "shelve", hours=2.0, kind="friction_high")
     assert answer.message.startswith("friction high: shelved until 20")

@@ -99,8 +99,7 @@ CHANGE = "spring_constant change [%]"
 
 
 def test_a_lost_spring_is_said_and_outlives_a_record_that_hardly_shows_it_and_a_kill(live, history):
-    node = live.start_identifier()
-    client = live.client
+    client = live.client_of_identifier()
     client.identified(HEALTHY)
     assert CHANGE not in values_of(client.statuses[-1][1])
     assert client.trigger("set_baseline").success
@@ -126,7 +125,7 @@ def test_a_lost_spring_is_said_and_outlives_a_record_that_hardly_shows_it_and_a_
 
     client.identified(HARDLY)
     assert "spring_constant" not in history.last_success(NODE).numbers
-    live.restart(node)
+    live.restart()
     after = client.next_status(lambda one: CHANGE in values_of(one), "the change after a restart")
     for one in (status, after):
         assert one.level == ERROR
@@ -138,8 +137,7 @@ def test_a_lost_spring_is_said_and_outlives_a_record_that_hardly_shows_it_and_a_
 @pytest.mark.parametrize("is_scheduled", [False, True])
 def test_lost_travel_is_said_though_its_record_is_refused(live, history, is_scheduled):
     """A sixth of the travel is lost: no model follows the record, but the stem's end is seen."""
-    node = live.start_identifier()
-    client = live.client
+    client = live.client_of_identifier()
     client.set_baseline(stroked_record())
     assert client.next_status().level == OK
     if is_scheduled:
@@ -158,18 +156,17 @@ def test_lost_travel_is_said_though_its_record_is_refused(live, history, is_sche
     assert ("was refused" in status.message) == (not is_scheduled)
     assert float(values_of(status)["lower_stop change [m]"]) == pytest.approx(4.572e-3, abs=5e-5)
     client.wait_until(lambda: history.entries()[-1].refusal, "the refusal in the history")
-    live.restart(node)
+    live.restart()
     after = client.next_status(lambda one: words in one.message, "the same after a restart")
     assert after.level == WARN
 
 
 def test_a_restored_baseline_brings_all_its_numbers_back(live):
-    node = live.start_identifier({"baseline_in_alarm": True})
-    client = live.client
+    client = live.client_of_identifier({"baseline_in_alarm": True})
     client.set_baseline(HEALTHY)
     client.set_baseline(WEAK)
     assert client.next_status(lambda one: one.level == OK, "a new baseline")
-    live.restart(node, {"baseline_in_alarm": True})
+    live.restart({"baseline_in_alarm": True})
     assert client.next_status(lambda one: CHANGE in values_of(one), "the kept one").level == OK
     assert client.trigger("restore_baseline").success
     status = client.next_status(lambda one: one.level == ERROR, "the first baseline")

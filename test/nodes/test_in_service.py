@@ -52,8 +52,7 @@ def shown(client, key, value):
 
 @pytest.mark.slow
 def test_usage_is_shown_kept_and_goes_on(live, history):
-    node = live.start_identifier()
-    client = live.client
+    client = live.client_of_identifier()
     after = send(client, strokes(16))  # 1024 samples: four blocks
     values = shown(client, "reversals", "15")
     far = 15 * TRAVEL + TRAVEL * 63 / 64
@@ -74,7 +73,7 @@ def test_usage_is_shown_kept_and_goes_on(live, history):
     shown(client, "reversals", "19")
     client.wait_until(lambda: read_usage(history, NODE).total.reversals == 19, "the last rows")
     kept = read_usage(history, NODE)
-    live.kill(node)
+    live.kill(live.nodes[-1])
     assert read_usage(history, NODE) == kept
 
     live.start_identifier()  # the same stamps once more are as good as new ones
@@ -115,8 +114,7 @@ def test_a_node_that_is_stopped_keeps_all(live, history):
 
 def test_a_warning_of_a_packing_outlives_a_rest_and_a_restart(live, history):
     """While the valve rests the expected date recedes; only a renewed packing ends the warning."""
-    node = live.start_identifier({"reversal_limit": 500.0})
-    client = live.client
+    client = live.client_of_identifier({"reversal_limit": 500.0})
     samples = 2 * DAY // PERIOD + 256
     after = send(client, np.tile(strokes(2, samples=512), -(-samples // 1024))[:samples])
     status = client.next_status(lambda one: "packing life" in one.message, "a warning")
@@ -126,7 +124,7 @@ def test_a_warning_of_a_packing_outlives_a_rest_and_a_restart(live, history):
     client.wait_until(
         lambda: read_usage(history, NODE).total.time_watched > 9 * DAY, "the rest in the history"
     )
-    live.restart(node, {"reversal_limit": 500.0})
+    live.restart({"reversal_limit": 500.0})
     status = client.next_status(lambda one: "packing life" in one.message, "the same warning")
     assert (status.level, values_of(status)["NE 107"]) == (WARN, "M")
     expected = values_of(status)["reversal_limit_expected [date]"]
@@ -184,7 +182,7 @@ def number(values, key):
 
 @pytest.mark.slow
 def test_it_adds_up_and_survives_a_kill(live, history):
-    node, client = live.start_identifier(SECURE), live.client
+    client = live.client_of_identifier(SECURE)
 
     def in_file():
         return read_moves(history, VALVE.name, BUILT)
@@ -203,7 +201,7 @@ def test_it_adds_up_and_survives_a_kill(live, history):
     assert number(values, "dead_band [%]") == pytest.approx(600 / 2.05e5 / 0.028575 * 100, rel=0.1)
     client.wait_until(lambda: len(in_file()) >= MOVES - 3, "moves in the history")
     assert "moves in service since 2023-11-14" in client.success("set_baseline")
-    live.kill(node)
+    live.kill(live.nodes[-1])
 
     kept = in_file()
     live.start_identifier(SECURE)
@@ -345,7 +343,7 @@ def test_moves_in_service(live, unit, scale):
 def test_the_figures_outlive_a_kill(live, history):
     """They are kept, shown by a node that hears no command yet, in its page and by a command."""
     slow = {"window": 3600.0, "dead_time_limit": 0.8}
-    node, client = live.start_identifier(slow), live.client
+    client = live.client_of_identifier(slow)
     commander(live)(TRAVEL)
     stamps, pressure, position = answer(1.0, 0.5)
     client.send((stamps, pressure), (stamps, position))
@@ -355,7 +353,7 @@ def test_the_figures_outlive_a_kill(live, history):
 
     before = values_of(client.next_status(is_late, "a late stem"))
     client.wait_until(lambda: len(read_answers(history, NODE)) == 6, "the moves in the history")
-    live.restart(node, {**slow, "method": "bench"})
+    live.restart({**slow, "method": "bench"})
     status = client.next_status(lambda one: "moves" in values_of(one), "the moves of before")
     after = values_of(status)
     assert status.level == WARN
