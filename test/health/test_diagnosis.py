@@ -65,26 +65,24 @@ class TestDeadBand:
         found = with_values(static_friction=942.0, **{name: unknown(name)})
         assert math.isnan(dead_band(found, BENCH_VALVE))
 
-    def test_its_interval(self, with_values):
-        """Errors of F_c and F_s as one, 60/1500; of the spring, 41/2050; these two independent."""
-        slip = with_values(
-            coulomb_friction=known("coulomb_friction", 600.0, 12.0),
-            static_friction=known("static_friction", 900.0, 48.0),
-            spring_constant=known("spring_constant", 2050.0, 41.0),
-        )
-        valve = Valve(1.0, travel=0.5)
-        wanted = dead_band(slip, valve) * math.hypot(60 / 1500, 41 / 2050)
-        assert dead_band_half_width(slip, valve) == pytest.approx(wanted, rel=1e-12)
+    @pytest.mark.parametrize(
+        ("static", "spring_width", "share"),
+        [((900.0, 48.0), 41.0, math.hypot(60 / 1500, 41 / 2050)), (None, 0.0, 0.02)],
+    )
+    def test_its_interval(self, with_values, unknown, static, spring_width, share):
+        """Errors of F_c and F_s as one, 60/1500; of the spring, 41/2050; these two independent.
 
-    def test_its_interval_without_a_slip_jump(self, with_values, unknown):
-        """F_s is F_c, with its error; a fixed spring has none."""
+        Without a slip jump F_s is F_c, with its error; a fixed spring has none.
+        """
         found = with_values(
             coulomb_friction=known("coulomb_friction", 600.0, 12.0),
-            static_friction=unknown("static_friction"),
-            spring_constant=known("spring_constant", 2050.0, 0.0),
+            static_friction=(
+                known("static_friction", *static) if static else unknown("static_friction")
+            ),
+            spring_constant=known("spring_constant", 2050.0, spring_width),
         )
         valve = Valve(1.0, travel=0.5)
-        wanted = dead_band(found, valve) * 0.02
+        wanted = dead_band(found, valve) * share
         assert dead_band_half_width(found, valve) == pytest.approx(wanted, rel=1e-12)
 
     def test_there_is_no_share_without_stops(self, result):

@@ -210,7 +210,7 @@ class TestMemory:
         monitor.refuse(RefusalError("the stem did not move"))
         assert monitor.refusal == "the stem did not move"
         assert str(monitor.diagnosis()) == "unknown: no estimate: the stem did not move"
-        monitor.fail("a bug")
+        monitor.internal_error = "a bug"
         failed = "ERROR: a bug; previous result: no estimate: the stem did not move"
         assert str(monitor.diagnosis()) == failed
         monitor.accept(result, START)
@@ -235,7 +235,7 @@ class TestInternalError:
         monitor = FrictionMonitor(SETTINGS)
         monitor.accept(result, START)
         good = monitor.diagnosis()
-        monitor.fail("internal error: a bug")
+        monitor.internal_error = "internal error: a bug"
         diagnosis = monitor.diagnosis()
         assert (diagnosis.level, diagnosis.status_signal) == (
             Level.ERROR,
@@ -255,7 +255,7 @@ class TestInternalError:
         monitor = compared_with(Baseline(coulomb_friction(result).value / 3))
         monitor.accept(result, START)
         alarm = monitor.diagnosis()
-        monitor.fail("internal error: a bug")
+        monitor.internal_error = "internal error: a bug"
         assert alarm.level == Level.ERROR
         failed = said(Code.FAILED, error="internal error: a bug", of=alarm.statement)
         assert monitor.diagnosis() == dataclasses.replace(alarm, statement=failed)

@@ -94,6 +94,11 @@ class Live:
         self.client.drain()
         self.client.statuses.clear()
 
+    def restart(self, parameters=None):
+        """Kill the node that was started last, and start an identifier with these parameters."""
+        self.kill(self.nodes[-1])
+        return self.start_identifier(parameters)
+
     def close(self):
         """Stop what still runs; every node must end well."""
         self.client.watched.clear()

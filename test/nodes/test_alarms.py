@@ -62,9 +62,7 @@ def test_an_alarm_outlives_a_kill(live):
     client.identified(TIGHT)
     before = client.statuses[-1][1]
     assert before.level == ERROR
-    live.kill(node)
-
-    node = live.start_identifier()
+    node = live.restart()
     after = client.next_status()
     assert after.level == ERROR
     (line,) = (one for one in node.errors.splitlines() if "baseline Coulomb friction 152.7" in one)
@@ -98,19 +96,6 @@ def test_an_alarm_outlives_a_kill(live):
     assert status.level == OK
     assert "before the restart" not in status.message
     assert values_of(status)["estimate_from"] == "this run"
-
-
-def test_an_age_of_days(live, history):
-    """The kept diagnosis is told whatever its age is, and the level as well."""
-    now = live.client.node.get_clock().now().nanoseconds
-    history.add(success(now - 5 * DAY - DAY // 2, 400.0, baseline=None))
-    history.set_baseline(VALVE, KeptBaseline(Baseline(100.0, 1.0), START, START))
-    node = live.start_identifier()
-    status = live.client.next_status()
-    assert status.level == ERROR
-    assert status.message.startswith("excess friction: Coulomb friction is 4.00 (")
-    assert status.message.endswith(" (identified 5 days ago, before the restart)")
-    live.client.wait_until(lambda: "level OK → ERROR: excess" in node.errors, "a logged level")
 
 
 def test_stamps_of_a_time_to_come(live, history, tmp_path):
@@ -154,8 +139,7 @@ def test_a_history_that_goes_while_the_node_runs_costs_no_baseline(live, history
     client.wait_until(lambda: "baseline in force is stored again" in node.errors, "a warning")
     again = history.baseline(VALVE.name)
     assert (again.baseline, again.time) == (kept.baseline, kept.time)
-    live.kill(node)
-    live.start_identifier()
+    live.restart()
     assert client.next_status().level == ERROR
 
 
@@ -207,36 +191,26 @@ def test_a_node_without_a_history_says_so_and_keeps_nothing(live, history):
 
 
 def test_the_baseline_is_guarded_and_restored(live, history):
-    node = live.start_identifier()
-    client = live.client
-    nothing = client.trigger("restore_baseline")
-    assert not nothing.success
-    assert nothing.message.startswith("there is no ~/set_baseline to undo")
+    client = live.client_of_identifier()
+    assert client.refusal("restore_baseline").startswith("there is no ~/set_baseline to undo")
     client.identified(HEALTHY)
     assert client.trigger("set_baseline").message == (f"baseline: {OLD}; previous: none{TAKEN}")
     client.identified(TIGHT)
     for service in ("set_baseline", "restore_baseline"):
-        refused = client.trigger(service)
-        assert not refused.success
-        assert refused.message.startswith("the valve is in ERROR, which a new baseline could hide")
-        assert "if the valve is healthy, set baseline_in_alarm to true" in refused.message
+        refused = client.refusal(service)
+        assert refused.startswith("the valve is in ERROR, which a new baseline could hide")
+        assert "if the valve is healthy, set baseline_in_alarm to true" in refused
     told = client.status_values()
     assert (told["baseline_possible"], told["baseline_lacks valve"]) == ("false", "HEALTH")
     assert told["friction_ratio"] != "1"
     assert len(history.baselines(VALVE.name)) == 1
 
     assert client.set_together(NODE, {"baseline_in_alarm": True}).successful
-    answer = client.trigger("set_baseline")
-    assert answer.success
-    assert answer.message == f"baseline: {NEW}; previous: {OLD}{TAKEN}"
+    assert client.success("set_baseline") == f"baseline: {NEW}; previous: {OLD}{TAKEN}"
     assert client.next_status().level == OK
-    live.kill(node)
-
-    live.start_identifier()  # by its default again
+    live.restart()  # by its default again
     assert client.next_status().level == OK
-    answer = client.trigger("restore_baseline")
-    assert answer.success
-    assert answer.message == f"baseline: {OLD}; previous: {NEW}"
+    assert client.success("restore_baseline") == f"baseline: {OLD}; previous: {NEW}"
     status = client.next_status()
     assert status.level == ERROR
     assert "excess friction" in status.message
@@ -249,9 +223,7 @@ def test_the_baseline_is_guarded_and_restored(live, history):
     kept = history.baseline(VALVE.name)
     assert kept.since == first.since < second.since
     assert kept.record is not None
-    again = client.trigger("restore_baseline")
-    assert not again.success
-    assert again.message.startswith("there is no ~/set_baseline to undo")
+    assert client.refusal("restore_baseline").startswith("there is no ~/set_baseline to undo")
 
 
 def test_a_baseline_of_the_parameter_is_replaced_and_comes_back(live, history):
@@ -260,9 +232,8 @@ def test_a_baseline_of_the_parameter_is_replaced_and_comes_back(live, history):
     given = Baseline(140.0)
     assert client.trigger("set_baseline").message == (f"baseline: {OLD}; previous: {given}{TAKEN}")
     assert client.set_together(NODE, {"baseline_coulomb_friction": 145.0}).successful
-    refused = client.trigger("restore_baseline")
-    assert not refused.success
-    assert "is no longer in force: set baseline_coulomb_friction" in refused.message
+    refused = client.refusal("restore_baseline")
+    assert "is no longer in force: set baseline_coulomb_friction" in refused
     assert (
         client.trigger("set_baseline").message
         == f"baseline: {OLD}; previous: {Baseline(145.0)}{TAKEN}"
@@ -295,8 +266,7 @@ def test_settings_name_the_alarms():
 
 @pytest.mark.slow
 def test_a_life_of_an_alarm(live, history):
-    node = live.start_identifier(KNOWN)
-    client = live.client
+    client = live.client_of_identifier(KNOWN)
     assert values_of(client.next_status())["alarm friction_high"] == "normal"
     refused = ask(client, "acknowledge")
     assert (refused.success, refused.message) == (
@@ -311,9 +281,7 @@ def test_a_life_of_an_alarm(live, history):
     assert (refused.success, refused.message) == (False, "who is empty: state your name")
     answer = ask(client, "acknowledge", text="repack on Monday")
     assert (answer.success, answer.message) == (True, "friction high: acknowledged")
-    live.kill(node)
-
-    live.start_identifier(KNOWN)
+    live.restart(KNOWN)
     state(client, "friction_high", "acknowledged")
     answer = ask(client, "shelve", hours=2.0, kind="friction_high")
     assert answer.message.startswith("friction high: shelved until 20")

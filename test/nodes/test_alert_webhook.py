@@ -209,8 +209,7 @@ def test_what_waited_at_a_kill_is_told_after_the_restart(live, history):
         node = live.start_identifier(chosen)
         client.wait_until(lambda: back.requests, "the alert that waited")
         client.wait_until(lambda: read_told_level(history, NODE) == Level.ERROR, "the told level")
-        live.kill(node)
-        live.start_identifier(chosen)
+        live.restart(chosen)
         client.next_status()
         client.next_status()
         assert changes(back) == [("OK", "ERROR")]

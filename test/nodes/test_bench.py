@@ -42,14 +42,17 @@ KARNOPP = ("mass", "viscous_friction", "coulomb_friction", "static_friction", "s
 EXACT = {"rtol": 0, "atol": 1e-12}  # m; pressure in and position out are doubles
 
 
+def wait_for_stem(client):
+    topic = f"{NAMESPACE}/stem_state"
+    client.wait_until(lambda: client.node.count_publishers(topic), "the stem")
+
+
 @pytest.fixture(scope="module")
 def running(shared):
     process = shared.start("simulator")
     states = shared.client.listen(JointState, f"{NAMESPACE}/stem_state", STREAM)
     shared.client.connect_pressure()
-    shared.client.wait_until(
-        lambda: shared.client.node.count_publishers(f"{NAMESPACE}/stem_state"), "the stem"
-    )
+    wait_for_stem(shared.client)
     return shared.client, states, process, [START]
 
 
@@ -165,9 +168,7 @@ def test_slip_jump_valve_with_noise_by_seed(live):
     live.start("simulator", values)
     states = live.client.listen(JointState, f"{NAMESPACE}/stem_state", STREAM)
     live.client.connect_pressure()
-    live.client.wait_until(
-        lambda: live.client.node.count_publishers(f"{NAMESPACE}/stem_state"), "the stem"
-    )
+    wait_for_stem(live.client)
     live.client.send(pressure=(STAMPS, PRESSURE))
     live.client.wait_until(lambda: len(states) >= 1000, "the stem's states")
     expected = simulate(GRAPHITE_VALVE, GRAPHITE_PACKING, PRESSURE, PERIOD).position
@@ -306,8 +307,7 @@ def test_it_plays_when_asked_and_goes_back_by_limit_and_by_its_end(stroke_player
     assert not live.client.trigger("start", PLAYER).success  # no signal has come
     wait(live, lambda: live.sent > 50, "send_signals")
     assert last(live) is None  # and nothing begins by itself
-    answer = live.client.trigger("start", PLAYER)
-    assert answer.success, answer.message
+    live.client.success("start", PLAYER)
     wait(live, lambda: last(live) == 1.4e5, "the highest set point")
     values = [one.fluid_pressure for one in live.set_points]
     assert values[0] == HOME
@@ -348,25 +348,12 @@ def plan():
 def test_what_is_reported_is_what_was_promised(live, plan, tmp_path):
     file = tmp_path / "stroke_test.csv"
     write_test(file, plan)
-    valve = {
-        "diaphragm_area": BENCH_VALVE.diaphragm_area,
-        "pressure_reference": BENCH_VALVE.pressure_reference,
-        "travel": BENCH_VALVE.travel,
-    }
-    names = (
-        "mass",
-        "viscous_friction",
-        "coulomb_friction",
-        "static_friction",
-        "spring_constant",
-        "spring_preload",
-    )
-    true = {name: getattr(HIGH_FRICTION, name) for name in names}
+    names = ("diaphragm_area", "pressure_reference", "travel")
+    valve = {name: getattr(BENCH_VALVE, name) for name in names}
+    true = {name: getattr(HIGH_FRICTION, name) for name in (*KARNOPP, "spring_preload")}
     live.start("simulator", {**valve, **true, "position_noise": 10e-6})
     live.start_identifier({**valve, "window": 40.0, "assumed_mass": 1.6})
-    live.client.wait_until(
-        lambda: live.client.node.count_publishers(f"{NAMESPACE}/stem_state"), "the stem"
-    )
+    wait_for_stem(live.client)
     heard = live.client.listen(JointState, f"{NAMESPACE}/stem_state", STREAM)
     played = {"sample_rate": TEST_RATE, "speed": TEST_SPEED, "pressure_noise": 100.0}
     live.start("pressure_source", player(plan, file) | played)
@@ -379,8 +366,7 @@ def test_what_is_reported_is_what_was_promised(live, plan, tmp_path):
     positions = [message.position[0] / BENCH_VALVE.travel for message in heard]
     assert 0.19 < min(positions) < 0.45
     assert 0.55 < max(positions) < 0.81
-    response = live.client.trigger("identify")
-    assert response.success, response.message
+    live.client.success("identify")
     promised = plan.forecasts[-1]
     assert promised.parameters.coulomb_friction == pytest.approx(606.0)
     values, widths = live.client.friction(*NAMES), live.client.half_widths(*NAMES)

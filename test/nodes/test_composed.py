@@ -212,9 +212,7 @@ def test_life_cycle(live, compose):
             assert not client.node.get_subscriptions_info_by_topic(f"{NAMESPACE}/stem_state")
             assert change(client, Transition.TRANSITION_CONFIGURE)
             assert state(client) == State.PRIMARY_STATE_INACTIVE
-            refused = client.trigger("identify")
-            assert not refused.success
-            assert "is inactive: activate it" in refused.message
+            assert "is inactive: activate it" in client.refusal("identify")
 
             assert change(client, Transition.TRANSITION_ACTIVATE)
             client.connect()

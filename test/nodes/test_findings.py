@@ -88,55 +88,7 @@ def test_limits_are_parameters_and_judge_at_once(client):
         client.next_status(lambda status, wanted=level: status.level == wanted, str(level))
 
 
-NARROW = {"warn_ratio": 1.25, "error_ratio": 1.5, "low_ratio": 0.5}
-
-
-def record_of(share):
-    """A record of the bench valve whose friction is so many times the usual one."""
-    names = ("coulomb_friction", "static_friction", "viscous_friction")
-    friction = {name: share * getattr(LOW_FRICTION, name) for name in names}
-    return quick_record(replace(LOW_FRICTION, **friction))
-
-
-HEALTHY, TIGHT, LOOSE = quick_record(), quick_record(HIGH_FRICTION), record_of(0.6)
-UNSURE = SensorNoise(15e-5, 300.0, seed=1).applied_to(record_of(1.42))
-
-
-@pytest.mark.slow
-def test_an_alarm_ends_by_a_sure_result_only_also_over_a_restart(live):
-    node = live.start_identifier(NARROW)
-    client = live.client
-
-    def status_after(record):
-        client.identified(record)
-        return client.statuses[-1][1]
-
-    client.set_baseline(HEALTHY)
-    assert status_after(TIGHT).level == ERROR
-
-    unsure = status_after(UNSURE)
-    values = values_of(unsure)
-    low, high = (float(values[f"friction_ratio {end}"]) for end in ("low", "high"))
-    assert low < NARROW["warn_ratio"] < NARROW["error_ratio"] < high
-    assert (unsure.level, values["NE 107"]) == (ERROR, "F")
-    assert unsure.message.startswith("excess friction: ")
-    assert "the latest record does not clear it: friction has grown: " in unsure.message
-    live.kill(node)
-
-    live.start_identifier(NARROW)
-    assert client.next_status().level == ERROR
-    status = status_after(HEALTHY)
-    assert (status.level, values_of(status)["NE 107"]) == (OK, "")
-
-    status = status_after(UNSURE)  # without an alarm before it: grown, not surely excessive
-    assert (status.level, values_of(status)["NE 107"]) == (WARN, "M")
-    assert status.message.startswith("friction has grown: ")
-
-    status = status_after(LOOSE)
-    assert (status.level, values_of(status)["NE 107"]) == (WARN, "M")
-    assert status.message.startswith("friction has fallen: ")
-
-
+HEALTHY = quick_record()
 SOFT = replace(LOW_FRICTION, spring_constant=LOW_FRICTION.spring_constant * 2 / 3)
 WEAK = quick_record(SOFT)
 HARDLY = SensorNoise(3e-5, 300.0, 3).applied_to(
@@ -147,8 +99,7 @@ CHANGE = "spring_constant change [%]"
 
 
 def test_a_lost_spring_is_said_and_outlives_a_record_that_hardly_shows_it_and_a_kill(live, history):
-    node = live.start_identifier()
-    client = live.client
+    client = live.client_of_identifier()
     client.identified(HEALTHY)
     assert CHANGE not in values_of(client.statuses[-1][1])
     assert client.trigger("set_baseline").success
@@ -170,14 +121,11 @@ def test_a_lost_spring_is_said_and_outlives_a_record_that_hardly_shows_it_and_a_
         LOW_FRICTION.spring_constant, 1e-3
     )
 
-    refused = client.trigger("set_baseline")
-    assert not refused.success
-    assert "the spring constant has changed" in refused.message
+    assert "the spring constant has changed" in client.refusal("set_baseline")
 
     client.identified(HARDLY)
     assert "spring_constant" not in history.last_success(NODE).numbers
-    live.kill(node)
-    live.start_identifier()
+    live.restart()
     after = client.next_status(lambda one: CHANGE in values_of(one), "the change after a restart")
     for one in (status, after):
         assert one.level == ERROR
@@ -189,8 +137,7 @@ def test_a_lost_spring_is_said_and_outlives_a_record_that_hardly_shows_it_and_a_
 @pytest.mark.parametrize("is_scheduled", [False, True])
 def test_lost_travel_is_said_though_its_record_is_refused(live, history, is_scheduled):
     """A sixth of the travel is lost: no model follows the record, but the stem's end is seen."""
-    node = live.start_identifier()
-    client = live.client
+    client = live.client_of_identifier()
     client.set_baseline(stroked_record())
     assert client.next_status().level == OK
     if is_scheduled:
@@ -201,30 +148,25 @@ def test_lost_travel_is_said_though_its_record_is_refused(live, history, is_sche
     client.wait_for_buffered(2 * len(lost))
     words = "travel is lost at the lower end: the stem stops +4.57 mm"
     if not is_scheduled:
-        answer = client.trigger("identify")
-        assert not answer.success
-        assert "no friction model reproduces the record" in answer.message
-        assert words in answer.message
+        answer = client.refusal("identify")
+        assert "no friction model reproduces the record" in answer
+        assert words in answer
     status = client.next_status(lambda one: words in one.message, "the lost travel")
     assert (status.level, values_of(status)["NE 107"]) == (WARN, "M")
     assert ("was refused" in status.message) == (not is_scheduled)
     assert float(values_of(status)["lower_stop change [m]"]) == pytest.approx(4.572e-3, abs=5e-5)
     client.wait_until(lambda: history.entries()[-1].refusal, "the refusal in the history")
-    live.kill(node)
-    live.start_identifier()
+    live.restart()
     after = client.next_status(lambda one: words in one.message, "the same after a restart")
     assert after.level == WARN
 
 
 def test_a_restored_baseline_brings_all_its_numbers_back(live):
-    node = live.start_identifier({"baseline_in_alarm": True})
-    client = live.client
+    client = live.client_of_identifier({"baseline_in_alarm": True})
     client.set_baseline(HEALTHY)
     client.set_baseline(WEAK)
     assert client.next_status(lambda one: one.level == OK, "a new baseline")
-    live.kill(node)
-
-    live.start_identifier({"baseline_in_alarm": True})
+    live.restart({"baseline_in_alarm": True})
     assert client.next_status(lambda one: CHANGE in values_of(one), "the kept one").level == OK
     assert client.trigger("restore_baseline").success
     status = client.next_status(lambda one: one.level == ERROR, "the first baseline")

@@ -54,8 +54,7 @@ def test_each_valve_has_its_own(client):
         lambda one: values_of(one)["buffered_samples"] == "1000", "all samples"
     )
     assert status.name == f"{NAMESPACE}/identifier: friction"
-    response = client.trigger("identify")
-    assert response.success, response.message
+    client.success("identify")
     expected = identify(record, BENCH_VALVE).values["coulomb_friction"]
     assert client.friction("coulomb_friction") == {"coulomb_friction": expected}
 
@@ -92,9 +91,7 @@ def test_processes_identify_and_may_die(live):
     assert client.friction("coulomb_friction") == {"coulomb_friction": expected}
     (identifying,) = identifying_processes(process.pid)
     os.kill(identifying, signal.SIGKILL)
-    response = client.trigger("identify")
-    assert not response.success
-    assert "ended before it answered" in response.message
+    assert "ended before it answered" in client.refusal("identify")
     assert client.trigger("identify").success
 
 

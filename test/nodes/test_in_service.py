@@ -52,8 +52,7 @@ def shown(client, key, value):
 
 @pytest.mark.slow
 def test_usage_is_shown_kept_and_goes_on(live, history):
-    node = live.start_identifier()
-    client = live.client
+    client = live.client_of_identifier()
     after = send(client, strokes(16))  # 1024 samples: four blocks
     values = shown(client, "reversals", "15")
     far = 15 * TRAVEL + TRAVEL * 63 / 64
@@ -74,7 +73,7 @@ def test_usage_is_shown_kept_and_goes_on(live, history):
     shown(client, "reversals", "19")
     client.wait_until(lambda: read_usage(history, NODE).total.reversals == 19, "the last rows")
     kept = read_usage(history, NODE)
-    live.kill(node)
+    live.kill(live.nodes[-1])
     assert read_usage(history, NODE) == kept
 
     live.start_identifier()  # the same stamps once more are as good as new ones
@@ -89,10 +88,9 @@ def test_a_renewed_packing_counts_anew(live, history):
     client = live.client_of_identifier()
     after = send(client, strokes(8))
     shown(client, "reversals", "7")
-    answer = client.trigger("reset_usage")
-    assert answer.success
-    assert "the previous packing, of unknown age: 0.228" in answer.message
-    assert "7 reversals" in answer.message
+    answer = client.success("reset_usage")
+    assert "the previous packing, of unknown age: 0.228" in answer
+    assert "7 reversals" in answer
     values = client.last_values()
     assert (values["reversals"], values["reversals in all"]) == ("0", "7")
     assert values["packing_renewed [date]"] != "not known"
@@ -116,8 +114,7 @@ def test_a_node_that_is_stopped_keeps_all(live, history):
 
 def test_a_warning_of_a_packing_outlives_a_rest_and_a_restart(live, history):
     """While the valve rests the expected date recedes; only a renewed packing ends the warning."""
-    node = live.start_identifier({"reversal_limit": 500.0})
-    client = live.client
+    client = live.client_of_identifier({"reversal_limit": 500.0})
     samples = 2 * DAY // PERIOD + 256
     after = send(client, np.tile(strokes(2, samples=512), -(-samples // 1024))[:samples])
     status = client.next_status(lambda one: "packing life" in one.message, "a warning")
@@ -127,9 +124,7 @@ def test_a_warning_of_a_packing_outlives_a_rest_and_a_restart(live, history):
     client.wait_until(
         lambda: read_usage(history, NODE).total.time_watched > 9 * DAY, "the rest in the history"
     )
-    live.kill(node)
-
-    live.start_identifier({"reversal_limit": 500.0})
+    live.restart({"reversal_limit": 500.0})
     status = client.next_status(lambda one: "packing life" in one.message, "the same warning")
     assert (status.level, values_of(status)["NE 107"]) == (WARN, "M")
     expected = values_of(status)["reversal_limit_expected [date]"]
@@ -187,15 +182,14 @@ def number(values, key):
 
 @pytest.mark.slow
 def test_it_adds_up_and_survives_a_kill(live, history):
-    node, client = live.start_identifier(SECURE), live.client
+    client = live.client_of_identifier(SECURE)
 
     def in_file():
         return read_moves(history, VALVE.name, BUILT)
 
-    refused = client.trigger("set_baseline")
-    assert not refused.success
-    assert refused.message.startswith("the valve has no result")
-    assert "moves in service cannot be the baseline yet: 0 moves up and 0 down" in refused.message
+    refused = client.refusal("set_baseline")
+    assert refused.startswith("the valve has no result")
+    assert "moves in service cannot be the baseline yet: 0 moves up and 0 down" in refused
     serve(client, 0, 300.0)
     values = client.status_values(
         lambda status: number(values_of(status), "sliding_friction [N]") > 0, "an estimate"
@@ -206,10 +200,8 @@ def test_it_adds_up_and_survives_a_kill(live, history):
     assert abs(friction - 300.0) < width < 30.0
     assert number(values, "dead_band [%]") == pytest.approx(600 / 2.05e5 / 0.028575 * 100, rel=0.1)
     client.wait_until(lambda: len(in_file()) >= MOVES - 3, "moves in the history")
-    answer = client.trigger("set_baseline")
-    assert answer.success, answer.message
-    assert "moves in service since 2023-11-14" in answer.message
-    live.kill(node)
+    assert "moves in service since 2023-11-14" in client.success("set_baseline")
+    live.kill(live.nodes[-1])
 
     kept = in_file()
     live.start_identifier(SECURE)
@@ -229,9 +221,7 @@ def test_it_adds_up_and_survives_a_kill(live, history):
     assert values["NE 107"] == "M"
     assert number(values, "change_ratio low") < 1.5 < number(values, "change_ratio high")
     assert number(values, "friction_ratio low") > 1.25
-    refused = client.trigger("set_baseline")
-    assert not refused.success
-    assert "the valve is in WARN" in refused.message
+    assert "the valve is in WARN" in client.refusal("set_baseline")
 
 
 def test_the_newer_of_identification_and_moves_leads_and_is_the_baseline(live, history):
@@ -255,9 +245,8 @@ def test_the_newer_of_identification_and_moves_leads_and_is_the_baseline(live, h
     _, _, before = status.message.partition("; friction normal: Coulomb friction is 1.00")
     assert dated in before
     assert client.set_together(NODE, {"baseline_in_alarm": True}).successful
-    answer = client.trigger("set_baseline")
-    assert answer.success, answer.message
-    assert "newer than the identification of 2023-11-14 22:13 UTC)" in answer.message
+    answer = client.success("set_baseline")
+    assert "newer than the identification of 2023-11-14 22:13 UTC)" in answer
     kept = history.baseline(VALVE.name).baseline
     assert kept.sliding.value == pytest.approx(450.0, rel=0.05)
     assert kept.coulomb_friction is None
@@ -354,7 +343,7 @@ def test_moves_in_service(live, unit, scale):
 def test_the_figures_outlive_a_kill(live, history):
     """They are kept, shown by a node that hears no command yet, in its page and by a command."""
     slow = {"window": 3600.0, "dead_time_limit": 0.8}
-    node, client = live.start_identifier(slow), live.client
+    client = live.client_of_identifier(slow)
     commander(live)(TRAVEL)
     stamps, pressure, position = answer(1.0, 0.5)
     client.send((stamps, pressure), (stamps, position))
@@ -364,9 +353,7 @@ def test_the_figures_outlive_a_kill(live, history):
 
     before = values_of(client.next_status(is_late, "a late stem"))
     client.wait_until(lambda: len(read_answers(history, NODE)) == 6, "the moves in the history")
-    live.kill(node)
-
-    live.start_identifier({**slow, "method": "bench"})
+    live.restart({**slow, "method": "bench"})
     status = client.next_status(lambda one: "moves" in values_of(one), "the moves of before")
     after = values_of(status)
     assert status.level == WARN

@@ -56,22 +56,13 @@ BAD_CHANGES = [  # changes, words of the reason
     ({"diaphragm_area": "large"}, "expected 'Type.DOUBLE' got 'Type.STRING'"),
     ({"window": 1}, "Wrong parameter type, expected"),  # the words are rclpy's
     ({"spring_constant": "large"}, "spring_constant: expected 'Type.DOUBLE' got 'Type.STRING'"),
-    ({"mass": -1.0}, "mass"),
     ({"spring_constant": 2e11}, "spring_constant"),
-    ({"mass": 1}, "mass: expected 'Type.DOUBLE' got 'Type.INTEGER'"),
-    ({"window": -1.0}, "window"),
     ({"input_timeout": 0.0}, "input_timeout"),
-    ({"period": -1.0}, "period"),
     ({"derivative_window": 30}, "window must be odd"),
-    ({"polynomial_order": 30}, "polynomial_order"),
     ({"polynomial_order": 20, "derivative_window": 21}, "at least order + 2 = 22"),
     ({"warn_ratio": 2.5}, "warn_ratio < error_ratio"),
-    ({"warn_ratio": 1.0}, "1 < warn_ratio"),
-    ({"low_ratio": 1.0}, "low_ratio < 1"),
     ({"assumed_mass": -1.0}, "assumed_mass"),
-    ({"area_uncertainty": -0.01}, "area_uncertainty"),
     ({"drive_scale_uncertainty": 0.5}, "drive_scale_uncertainty must be at least 0 and below 0.5"),
-    ({"position_scale_uncertainty": 2.0}, "position_scale_uncertainty"),
     ({"position_bias": 1e-3, "fixed.spring_preload": 200.0}, "exclude each other"),
     (
         {"method": "guess"},
@@ -253,7 +244,6 @@ def test_simulated_time(live):
         lambda: any(buffered(status) == 1000 for _, status in client.statuses[seen:]), "all samples"
     )
     run_until_stamped(1000 * SECOND, 2000 * SECOND)
-    response = client.trigger("identify")
-    assert not response.success
-    assert "no samples" in response.message
-    assert "the buffer was cleared: ROS time jumped by -" in response.message
+    response = client.refusal("identify")
+    assert "no samples" in response
+    assert "the buffer was cleared: ROS time jumped by -" in response

@@ -30,96 +30,74 @@ WAIT = 3.0
 """Time between two samples of a sensor that reports seldom, s."""
 
 
-class Sensors:
-    """Both sensors of each valve, by nodes of their own."""
-
-    def __init__(self, context):
-        self._node = rclpy.create_node("sensors", context=context, enable_rosout=False)
-        self._player = rclpy.create_node("rosbag2_player", context=context, enable_rosout=False)
-        self._publishers = {}
-        for valve in VALVES:
-            node = self._player if valve == PLAYED else self._node
-            self._publishers[valve] = (
-                node.create_publisher(FluidPressure, f"/{valve}/actuator_pressure", STREAM),
-                node.create_publisher(JointState, f"/{valve}/stem_state", STREAM),
-            )
-        self._due = dict.fromkeys(VALVES, 0.0)
-        self.is_nonsense = False
-
-    def are_connected(self):
-        return all(one.get_subscription_count() for two in self._publishers.values() for one in two)
-
-    def turn(self):
-        """Say what is due."""
-        for valve, due in self._due.items():
-            if time.monotonic() < due:
-                continue
-            self._due[valve] = time.monotonic() + (WAIT if valve == SLOW else PERIOD)
-            now = time.time_ns()
-            kind = KINDS.get(valve) if self.is_nonsense else None
-            pressure, stem = said(Nonsense.CLOCK_BEHIND if valve == PLAYED else kind, now)
-            if valve == STILL:
-                pressure.fluid_pressure, stem.position = 1.2e5, [0.006]
-            for publisher, message in zip(self._publishers[valve], (pressure, stem), strict=True):
-                publisher.publish(message)
-
-    def close(self):
-        self._node.destroy_node()
-        self._player.destroy_node()
-
-
 @pytest.fixture
-def sensors(live):
-    found = Sensors(live.client.context)
-    yield found
-    found.close()
+def publishers(live):
+    """The publishers of pressure and stem of each valve; those of one are of a player of bags."""
+    context = live.client.context
+    nodes = [
+        rclpy.create_node(name, context=context, enable_rosout=False)
+        for name in ("sensors", "rosbag2_player")
+    ]
+    yield {
+        valve: (
+            nodes[valve == PLAYED].create_publisher(
+                FluidPressure, f"/{valve}/actuator_pressure", STREAM
+            ),
+            nodes[valve == PLAYED].create_publisher(JointState, f"/{valve}/stem_state", STREAM),
+        )
+        for valve in VALVES
+    }
+    for node in nodes:
+        node.destroy_node()
 
 
 class Plant:
     """What the diagnostics say of each valve while its sensors go on."""
 
-    def __init__(self, client, sensors):
-        self.client, self.sensors = client, sensors
-        self.told = {}
+    def __init__(self, client, publishers):
+        self._client, self._publishers = client, publishers
+        self._due = dict.fromkeys(VALVES, 0.0)
+        self.is_nonsense = False
+
+    def _send(self):
+        """Publish what is due."""
+        for valve, due in self._due.items():
+            if time.monotonic() < due:
+                continue
+            self._due[valve] = time.monotonic() + (WAIT if valve == SLOW else PERIOD)
+            kind = KINDS.get(valve) if self.is_nonsense else None
+            kind = Nonsense.CLOCK_BEHIND if valve == PLAYED else kind
+            pressure, stem = said(kind, time.time_ns())
+            if valve == STILL:
+                pressure.fluid_pressure, stem.position = 1.2e5, [0.006]
+            for publisher, message in zip(self._publishers[valve], (pressure, stem), strict=True):
+                publisher.publish(message)
 
     def status(self, valve):
-        found = (s for _, s in reversed(self.client.statuses) if s.hardware_id == valve)
-        return next(found, None)
+        statuses = (one for _, one in reversed(self._client.statuses) if one.hardware_id == valve)
+        return next(statuses, None)
 
-    def spin(self, condition, what, limit):
+    def wait(self, condition, what, limit=PATIENCE):
+        """Let the sensors go on until `condition()` is true; return how long that took, s."""
+        begun = time.monotonic()
+
         def met():
-            self.sensors.turn()
+            self._send()
             return condition()
 
-        self.client.wait_until(met, what, limit)
+        self._client.wait_until(met, what, limit)
+        return time.monotonic() - begun
 
     def go_on(self, seconds):
         end = time.monotonic() + seconds
-        self.spin(lambda: time.monotonic() > end, f"{seconds} s", 2 * seconds + 10)
+        self.wait(lambda: time.monotonic() > end, f"{seconds} s")
 
     def is_calm(self, valves=VALVES):
-        known = [self.status(valve) for valve in valves]
-        return all(one is not None and is_calm(one) for one in known)
-
-    def all_told(self, begin):
-        for valve, kind in KINDS.items():
-            if valve not in self.told and is_told(self.status(valve), kind):
-                self.told[valve] = time.monotonic() - begin
-        return len(self.told) == len(KINDS)
-
-    def require_told(self):
-        """Let all sensors say nonsense, and wait until all of it is told."""
-        self.sensors.is_nonsense, begin = True, time.monotonic()
-        try:
-            self.spin(lambda: self.all_told(begin), "nonsense told", 2 * TOLD_WITHIN)
-        except AssertionError as error:
-            lacking = {one: self.status(one).message for one in KINDS if one not in self.told}
-            raise AssertionError(f"{error}: {lacking}") from None
-        assert max(self.told.values()) <= TOLD_WITHIN, self.told
+        return all(is_calm(self.status(valve)) for valve in valves)
 
 
 def is_calm(status):
-    return status.level == OK and "friction normal" in status.message
+    return status is not None and status.level == OK and "friction normal" in status.message
 
 
 def is_told(status, kind):
@@ -151,18 +129,23 @@ def node(live, history):
 
 
 @pytest.mark.slow
-def test_nonsense_is_told_within_5_s_cleared_after_it_and_nothing_else_is(live, node, sensors):
-    plant = Plant(live.client, sensors)
-    plant.spin(sensors.are_connected, "connections", PATIENCE)
-    plant.spin(plant.is_calm, "calm", PATIENCE)
+def test_nonsense_is_told_within_5_s_cleared_after_it_and_nothing_else_is(live, node, publishers):
+    plant, untold = Plant(live.client, publishers), set(KINDS)
+    of_sensors = [one for both in publishers.values() for one in both]
+    plant.wait(lambda: all(one.get_subscription_count() for one in of_sensors), "connections")
+    plant.wait(plant.is_calm, "calm")
 
-    plant.require_told()
+    def all_told():
+        untold.difference_update([v for v in untold if is_told(plant.status(v), KINDS[v])])
+        return not untold
+
+    plant.is_nonsense = True
+    assert plant.wait(all_told, "nonsense told", 2 * TOLD_WITHIN) <= TOLD_WITHIN
     assert plant.is_calm((SLOW, STILL, PLAYED))
     plant.go_on(4.0)
 
-    sensors.is_nonsense, begin = False, time.monotonic()
-    plant.spin(plant.is_calm, "the end of all nonsense", 2 * TOLD_WITHIN)
-    assert time.monotonic() - begin <= TOLD_WITHIN
+    plant.is_nonsense = False
+    assert plant.wait(plant.is_calm, "the end of all nonsense", 2 * TOLD_WITHIN) <= TOLD_WITHIN
     seen = len(live.client.statuses)
     plant.go_on(11.0)  # after ten the log tells the end
     assert all(is_calm(status) for _, status in live.client.statuses[seen:])

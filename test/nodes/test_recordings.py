@@ -154,9 +154,8 @@ def test_a_played_bag_gives_the_numbers_of_the_live_run(run, live):
 
 
 def test_a_saved_buffer_gives_the_numbers_of_the_node(run):
-    response = run.client.trigger("save")
-    assert response.success, response.message
-    saved = Path(response.message)
+    response = run.client.success("save")
+    saved = Path(response)
     assert saved.parent == run.folder / "saved"
     assert re.fullmatch(r"fv_101_\d{8}T\d{6}Z", saved.name)
     with Reader(saved) as bag:
@@ -194,9 +193,7 @@ def test_what_cannot_be_written_is_told_and_the_node_goes_on(live, tmp_path):
                "report": (tmp_path / "file" / "pages", "a report", "Not a directory")}  # fmt: skip
     start_saving_into(live, folders["save"][0], report_folder=folders["report"][0])
     for service, (folder, what, reason) in folders.items():
-        response = live.client.trigger(service)
-        assert not response.success
-        assert response.message == f"cannot write {what} into {folder}: {reason}"
+        assert live.client.refusal(service) == f"cannot write {what} into {folder}: {reason}"
     assert live.client.trigger("identify").success
     assert list((tmp_path / FULL).iterdir()) == []
 
@@ -236,9 +233,7 @@ def test_nobody_on_the_graph_fills_the_disk_by_saving(live, tmp_path):
 
 def test_an_empty_buffer_is_not_saved(run):
     assert run.client.trigger("clear").success
-    response = run.client.trigger("save")
-    assert not response.success
-    assert response.message == "the buffer is empty: there is nothing to save"
+    assert run.client.refusal("save") == "the buffer is empty: there is nothing to save"
 
 
 def test_without_a_folder_it_goes_under_ros_home(live, tmp_path):
@@ -246,6 +241,5 @@ def test_without_a_folder_it_goes_under_ros_home(live, tmp_path):
     live.start_identifier()
     live.client.send(pressure=(np.array([1, 2]), np.array([1e5, 1e5])))
     live.client.wait_for_buffered(2)
-    response = live.client.trigger("save")
-    assert response.success, response.message
-    assert Path(response.message).parent == tmp_path / "valve_friction_ros" / "saved"
+    response = live.client.success("save")
+    assert Path(response).parent == tmp_path / "valve_friction_ros" / "saved"

@@ -26,9 +26,8 @@ from valve_friction_ros.model import HIGH_FRICTION
 
 def report(client):
     """Ask for a report; its path and its page."""
-    response = client.trigger("report")
-    assert response.success, response.message
-    path = Path(response.message)
+    response = client.success("report")
+    path = Path(response)
     return path, PageReader(path.read_text(encoding="utf-8"))
 
 
@@ -43,9 +42,7 @@ def bench(shared, tmp_path_factory):
 @pytest.mark.slow
 def test_the_last_estimate_is_drawn_from_its_own_record(bench):
     client, folder = bench
-    before = client.trigger("report")
-    assert not before.success
-    assert before.message == "the valve has no result to report: identify it first"
+    assert client.refusal("report") == "the valve has no result to report: identify it first"
     assert not folder.exists()
 
     low = quick_record()

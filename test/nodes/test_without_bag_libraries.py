@@ -48,9 +48,8 @@ def test_save_is_refused_and_the_identifier_goes_on(live):
     process = live.start_identifier()
     live.client.wait_until(lambda: "ready" in process.errors, "the ready line")
     for _ in range(2):
-        response = live.client.trigger("save")
-        assert not response.success
-        assert LINE.fullmatch(response.message), response.message
+        response = live.client.refusal("save")
+        assert LINE.fullmatch(response), response
 
 
 def test_csv_is_identified_and_a_bag_is_refused(loose_record, bench_yaml, tmp_path):

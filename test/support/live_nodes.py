@@ -228,6 +228,18 @@ class Client(Participant):
     def trigger(self, service, node=NODE):
         return self.call(Trigger, f"{node}/{service}", Trigger.Request())
 
+    def success(self, service, node=NODE):
+        """Call a service that must do its work; its message."""
+        response = self.trigger(service, node)
+        assert response.success, response.message
+        return response.message
+
+    def refusal(self, service, node=NODE):
+        """Call a service that must refuse; its reason."""
+        response = self.trigger(service, node)
+        assert not response.success, response.message
+        return response.message
+
     def identify_all(self, count):
         """Identify once the buffer holds exactly `count` samples of both signals; the response.
 

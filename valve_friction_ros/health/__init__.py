@@ -67,7 +67,6 @@ from valve_friction_ros.health.friction_monitor import (
     identify_snapshot as identify_snapshot,
     identify_with_numbers as identify_with_numbers,
 )
-from valve_friction_ros.health.known_numbers import KnownNumbers as KnownNumbers
 from valve_friction_ros.health.levels import (
     Finding as Finding,
     Level as Level,
@@ -88,6 +87,7 @@ from valve_friction_ros.health.standstill import (
     standstill_finding as standstill_finding,
 )
 from valve_friction_ros.health.valve_diagnosis import (
+    KnownNumbers as KnownNumbers,
     ValveDiagnosis as ValveDiagnosis,
     ValveLimits as ValveLimits,
     diagnose_numbers as diagnose_numbers,

@@ -125,8 +125,7 @@ class Comparison(NamedTuple):
     @property
     def share(self) -> float:
         """Half the width of the interval of the ratio's logarithm."""
-        values = (self.now[0], self.healthy[0])
-        return self._apart(*values)
+        return self._apart(self.now[0], self.healthy[0])
 
     @property
     def excess(self) -> tuple[float, float]:

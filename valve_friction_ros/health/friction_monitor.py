@@ -25,11 +25,11 @@ from valve_friction_ros.health.diagnosis import (
     diagnose,
     diagnose_again,
 )
-from valve_friction_ros.health.known_numbers import KnownNumbers
 from valve_friction_ros.health.levels import Finding, Level, StatusSignal
 from valve_friction_ros.health.measured import Measured, valve_changes
 from valve_friction_ros.health.standstill import held_finding, held_numbers
 from valve_friction_ros.health.valve_diagnosis import (
+    KnownNumbers,
     ValveDiagnosis,
     ValveLimits,
     diagnose_numbers,
@@ -441,10 +441,6 @@ class FrictionMonitor:
         if self._refused < _REFUSED:
             return None
         return said(Code.REFUSED_REPEATEDLY, count=self._refused, reason=self._refused_last)
-
-    def fail(self, internal_error: str) -> None:
-        """Store the bug that ended an identification."""
-        self.internal_error = internal_error
 
     def result_as_baseline(self) -> Baseline:
         """Return the frictions of the latest result, without making them the baseline.

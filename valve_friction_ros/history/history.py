@@ -18,8 +18,8 @@ import sqlalchemy as sa
 from sqlalchemy.engine import Connection
 
 from valve_friction_ros.health.baseline import Baseline
-from valve_friction_ros.health.known_numbers import KnownNumbers
 from valve_friction_ros.health.measured import DatedNumber
+from valve_friction_ros.health.valve_diagnosis import KnownNumbers
 from valve_friction_ros.history import tables
 from valve_friction_ros.history.database import is_ready, marked, reading, writing
 from valve_friction_ros.history.entry import (

@@ -35,9 +35,9 @@ from valve_friction_ros.health.diagnosis import (
     StandingAlarm,
     friction_state,
 )
-from valve_friction_ros.health.known_numbers import KnownNumbers
 from valve_friction_ros.health.levels import Level, StatusSignal
 from valve_friction_ros.health.measured import DIFFERENCES, RATIOS, Measured
+from valve_friction_ros.health.valve_diagnosis import KnownNumbers
 from valve_friction_ros.history import tables
 from valve_friction_ros.history.entry import (
     AlarmRecording,

@@ -37,27 +37,20 @@ _CALM = 10.0
 fault."""
 
 
-class LevelLog:
-    """Logs changes of the level of a valve; the initial level is OK."""
-
-    def __init__(self, node: Node) -> None:
-        self._log = node.get_logger()
-        self._level = Level.OK
-
-    def follow(self, status: DiagnosticStatus) -> None:
-        """Log the level of a status if it has changed."""
-        level = Level(status.level[0])
-        if level == self._level:
-            return
-        line = f"level {self._level.name} → {level.name}: {status.message}"
-        self._level = level
-        # rclpy requires that a line of code always logs with the same severity.
-        if level is Level.OK:
-            self._log.info(line)
-        elif level is Level.WARN:
-            self._log.warning(line)
-        else:
-            self._log.error(line)
+def log_level(node: Node, before: Level, status: DiagnosticStatus) -> Level:
+    """Log the level of a status if it differs from the one before; return it."""
+    level, log = Level(status.level[0]), node.get_logger()
+    if level == before:
+        return level
+    line = f"level {before.name} → {level.name}: {status.message}"
+    # rclpy requires that a line of code always logs with the same severity.
+    if level is Level.OK:
+        log.info(line)
+    elif level is Level.WARN:
+        log.warning(line)
+    else:
+        log.error(line)
+    return level
 
 
 class FaultLog:

@@ -40,7 +40,7 @@ from valve_friction_ros.health.measured import DIFFERENCES
 from valve_friction_ros.history import HistoryError
 from valve_friction_ros.identification import STATED, RefusalError, require_valve_units
 from valve_friction_ros.nodes.identifier.alarm_board import AlarmBoard
-from valve_friction_ros.nodes.identifier.alerts import Alerts, FaultLog, LevelLog, webhook_from
+from valve_friction_ros.nodes.identifier.alerts import Alerts, FaultLog, log_level, webhook_from
 from valve_friction_ros.nodes.identifier.baseline_in_force import BaselineInForce, baseline_from
 from valve_friction_ros.nodes.identifier.evidence_watch import EvidenceWatch
 from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter, sender_with_rows
@@ -227,7 +227,7 @@ class Identifier(ManagedNode):
         self._inputs = ValveInputs(self, joint, self._take_samples, self._drop_damaged)
         pressure, stem, _ = self._inputs.names
         self._readiness = Readiness(self, workers.identify, f"identifies {pressure} and {stem}")
-        self._level_log = LevelLog(self)
+        self._logged_level = Level.OK
         self._estimate_topic = EstimateTopic(self, self.get_parameter("estimate_topic").value)
         results = NumberTopics(self)
         self._identification = Identification(self, self._monitor, results, workers)
@@ -553,7 +553,7 @@ class Identifier(ManagedNode):
             self._board.alarms,
             max([Level.OK, *(one.level for one in beside), *[Level.WARN] * bool(upkeep)]),
         )
-        self._level_log.follow(status)
+        self._logged_level = log_level(self, self._logged_level, status)
         self._fault_log.follow(faults, time.monotonic())
         if self._readiness.is_slow:
             status.message += f"; {self._readiness.problem}"

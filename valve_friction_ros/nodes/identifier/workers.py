@@ -217,7 +217,7 @@ class Identification:
             self._monitor.learn(refused.numbers, self._node.get_clock().now().nanoseconds)
             raise
         except InternalError as error:
-            self._monitor.fail(str(error))
+            self._monitor.internal_error = str(error)
             raise
         finally:
             self._is_running = False
