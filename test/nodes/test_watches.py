@@ -445,7 +445,7 @@ def test_a_recording_that_is_played_costs_no_kept_move(tmp_path):
     bench.error = -HOUR
     bench.serve(20)
     assert len(bench.ledger.moves) == 20
-    assert "when playing a recording" in bench.ledger.problem
+    assert "to play a recording" in bench.ledger.problem
 
 
 EXACT = IdentificationSettings(timing_uncertainty=0.005)
