@@ -23,6 +23,7 @@ from valve_friction_ros.identification import (
     identify_bench,
     identify_plant,
 )
+from valve_friction_ros.identification.refusal import LittleMotionError
 from valve_friction_ros.identification.trust.excitation import (
     _followed,
     require_enough_samples,
@@ -238,6 +239,23 @@ def test_motion_is_ten_times_the_noise(share, moves):
             f"the stem did not move: its position spans {span * 1e6:.3g} µm with "
             f"{position_noise(noise) * 1e6:.3g} µm of noise; "
         )
+
+
+def test_a_stem_that_jumps_between_samples_did_move():
+    """A stem that swings over half of its travel in the time of a few samples is no stem at rest.
+
+    That is no lack of motion, which would be no fault of a valve.
+    """
+    swinging = record(0.01 * np.sin(2.3 * np.arange(400)))
+    with pytest.raises(RefusalError, match="jumps from sample to sample") as caught:
+        require_motion(swinging, 0.04)
+    assert not isinstance(caught.value, LittleMotionError)
+    assert "did not move" in refusal(require_motion, swinging, 4.0)
+
+
+def test_a_loop_that_hunts_in_the_time_of_the_average_moves_both_ways():
+    """31 samples at 10 Hz are a whole period of it, in which all averages are alike."""
+    require_two_directions(record(0.01 * np.sin(2 * np.pi * np.arange(620) / 31)), 31, 0.04)
 
 
 @pytest.mark.parametrize("window", [1, 10])

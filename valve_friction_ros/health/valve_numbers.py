@@ -409,7 +409,7 @@ def numbers_of_refused(
         require_plausible_units(recording, valve, settings)
         require_within_travel(recording, valve)
         numbers |= sensor_noises(recording)
-        require_motion(recording)
+        require_motion(recording, valve.travel)
         require_two_directions(recording, settings.published_window, valve.travel)
         require_travel(recording, valve)
         require_related_signals(recording)

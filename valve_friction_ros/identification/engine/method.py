@@ -403,7 +403,7 @@ def require_moving_stem(
     if has_own_stamps:
         window = int(np.clip(len(record) // _WINDOWS, _SHORTEST_WINDOW, window))
     excitation.require_enough_samples(record, window)
-    excitation.require_motion(record)
+    excitation.require_motion(record, valve.travel)
     excitation.require_two_directions(record, window, valve.travel)
     excitation.require_within_travel(record, valve)
     excitation.require_changing_drive(record)

@@ -278,7 +278,7 @@ def require_published(
     """Refuse a record with a gap, or whose stem does not move both ways."""
     excitation.require_unbroken(record)
     excitation.require_enough_samples(record, settings.published_window)
-    excitation.require_motion(record)
+    excitation.require_motion(record, valve.travel)
     excitation.require_drive(record, valve)
     require_plausible_units(record, valve, settings)
     excitation.require_two_directions(record, settings.published_window)

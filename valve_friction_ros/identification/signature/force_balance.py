@@ -172,7 +172,7 @@ def _measured(
     excitation.require_unbroken(record)
     require_plausible_units(record, valve, settings)
     excitation.require_enough_samples(record, settings.published_window)
-    excitation.require_motion(record)
+    excitation.require_motion(record, valve.travel)
     excitation.require_travel(record, valve)
     excitation.require_related_signals(record)
     return record

@@ -240,7 +240,7 @@ def validate(
         )
     record = measured(recording)
     excitation.require_unbroken(record)
-    excitation.require_motion(record)
+    excitation.require_motion(record, valve.travel)
     excitation.require_drive(record, valve)
     trajectory = simulate(
         valve,

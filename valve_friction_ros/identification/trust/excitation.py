@@ -41,6 +41,13 @@ _MOTION_OVER_NOISE = 10.0
 White noise alone spans 9 standard deviations in 60,000 samples; simulated records span 70 and
 more."""
 
+_SEVERAL_PERCENT = 0.05
+"""Range of the position over the travel above which a stem that only seems to be noisy did move."""
+
+_SHORT_MOVE, _FEWEST_AVERAGED = 0.5, 3
+"""Time, s, over which the position is averaged at most, and samples at least, to see both
+directions. Chosen: 31 samples at 10 Hz are as long as the period of a loop that hunts."""
+
 _LEAST_SHARE_OF_DIRECTION = 0.02
 """Least distance in the rarer direction, as a share of the whole distance.
 
@@ -128,11 +135,21 @@ def require_unbroken(recording: Recording) -> None:
         raise RefusalError(recording.gap)
 
 
-def require_motion(recording: Recording) -> None:
-    """Refuse a recording whose stem did not move by more than its noise."""
+def require_motion(recording: Recording, travel: float = math.inf) -> None:
+    """Refuse a recording whose stem did not move by more than its noise.
+
+    A stem that moves far between two samples looks like noise: its range is a large share of the
+    `travel`, m.
+    """
     span = float(np.ptp(recording.position))
     noise = measured(recording).white_noise
     if span == 0 or span < _MOTION_OVER_NOISE * noise:
+        if span > _SEVERAL_PERCENT * travel:
+            raise RefusalError(
+                f"the stem jumps from sample to sample, {recording.sample_period:.3g} s apart (its "
+                f"position spans {span * 1e6:.3g} µm with {noise * 1e6:.3g} µm of noise or unseen "
+                "motion): sample faster, or check the stem sensor"
+            )
         raise LittleMotionError(
             f"the stem did not move: its position spans {span * 1e6:.3g} µm with "
             f"{noise * 1e6:.3g} µm of noise; move the valve over several percent of its travel"
@@ -162,17 +179,21 @@ def _distances(position: NDArray[np.float64], deadband: float) -> tuple[float, f
 def require_two_directions(recording: Recording, window: int, travel: float = math.inf) -> None:
     """Refuse a stem that moves in one direction only, or hardly in the other.
 
-    The position is averaged over `window` samples first. Turns within its noise are ignored, and so
-    is a distance that a packing may yield elastically before it slides, a share of the `travel` of
-    the valve, m.
+    The position is averaged over `window` samples first, and over fewer where these take longer
+    than a move may. Turns within its noise are ignored, and so is a distance that a packing may
+    yield elastically before it slides, a share of the `travel` of the valve, m.
     """
     require_enough_samples(recording, window)
-    means = len(recording) // window
-    position = recording.position[: means * window].reshape(means, window).mean(axis=1)
-    noise = measured(recording).white_noise / np.sqrt(window)
-    up, down = _distances(position, _MOTION_OVER_NOISE * noise)
     elastic = _ELASTIC * travel if math.isfinite(travel) else 0.0
-    if min(up, down) < max(_LEAST_SHARE_OF_DIRECTION * (up + down), elastic):
+    shorter = max(int(_SHORT_MOVE / recording.sample_period), _FEWEST_AVERAGED)
+    ways = []
+    for length in (window, min(window, shorter)):
+        means = len(recording) // length
+        position = recording.position[: means * length].reshape(means, length).mean(axis=1)
+        noise = measured(recording).white_noise / np.sqrt(length)
+        ways.append(_distances(position, _MOTION_OVER_NOISE * noise))
+    if all(min(one) < max(_LEAST_SHARE_OF_DIRECTION * sum(one), elastic) for one in ways):
+        up, down = ways[0]
         way = "up" if up > down else "down"
         raise LittleMotionError(
             f"the stem moved only {way} ({up * 1e3:.3g} mm up, {down * 1e3:.3g} mm down): "
