@@ -42,7 +42,11 @@ from valve_friction_ros.identification.engine.search import (
     _Search,
     lagging,
 )
-from valve_friction_ros.identification.engine.verdicts import main_doubt, sampling_remarks
+from valve_friction_ros.identification.engine.verdicts import (
+    found_imperfections,
+    main_doubt,
+    sampling_remarks,
+)
 from valve_friction_ros.identification.result import Pause, StemComparison
 from valve_friction_ros.identification.trust.verdict import interval_share
 from valve_friction_ros.model import BENCH_VALVE, LOW_FRICTION, Drive, Recording, simulate
@@ -314,6 +318,19 @@ def test_no_fit_without_a_lag_begins_with_a_stem_that_swings(model, monkeypatch)
     search.without_lag(best, {**best.at, "viscous_friction": 1e-15, "delay": -0.01})
     (start,) = starts
     assert start["viscous_friction"] >= SWINGING * start["spring_constant"]
+
+
+@pytest.mark.parametrize(
+    ("clock", "pressure", "said"),
+    [(0.062, -0.048, ""), (0.014, 0.0, "clock offset"), (0.001, 0.013, "lag of the pressure")],
+)
+def test_lags_that_compensate_each_other_are_not_named(clock, pressure, said):
+    """Each is far beyond its own deviation; only their sum, 14 ms, is in the record."""
+    at = dict(zip(TIMING, (clock, 0.0, pressure), strict=True))
+    found = SimpleNamespace(names=TIMING, at=at, deviation=dict.fromkeys(TIMING, 2e-4).get)
+    lag = Estimated(clock + pressure, 0.002, 0.001)
+    sentences = found_imperfections(found, lag)
+    assert [one.partition(" (")[0].partition(":")[0] for one in sentences] == [said] * bool(said)
 
 
 def test_every_source_has_words():

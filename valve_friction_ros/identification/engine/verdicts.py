@@ -87,14 +87,17 @@ def slips(fit: PosteriorFit) -> bool:
 def found_imperfections(fit: PosteriorFit, lag: Estimated) -> tuple[str, ...]:
     """Return a sentence for each imperfection that is certain, the most certain first.
 
-    A single source of a lag is certain only if their sum is, `lag`, s, over all probable fits.
+    A single source of a lag is certain only if their sum is, `lag`, s, over all probable fits, and
+    if it explains that sum alone: sources that compensate each other may all be absent.
     """
     found = []
     is_late = abs(lag.value) > _SURE * lag.half_width / NORMAL_QUANTILE
     for name in fit.names:
-        if (name == "slip_force" and not slips(fit)) or (name in TIMING and not is_late):
-            continue
         value, deviation, one = fit.at[name], fit.deviation(name), IMPERFECTIONS.get(name)
+        if name == "slip_force" and not slips(fit):
+            continue
+        if name in TIMING and not (is_late and abs(value - lag.value) <= lag.half_width):
+            continue
         if one and abs(value) > max(one.least, _SURE * deviation):
             found.append((deviation / abs(value), f"{one.words}: {_size(name, value)}"))
     return tuple(sentence for _, sentence in sorted(found))
