@@ -366,6 +366,11 @@ def capitalised(text: str) -> str:
     return f"{text[:1].upper()}{text[1:]}"
 
 
+def numbered(count: int, noun: str) -> str:
+    """Write a number of things: 1 valve, 3 valves."""
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
 def two_digits(value: float) -> str:
     """Write a number with two significant digits, or as an integer from 100 on; no exponent."""
     return f"{value:.2g}" if abs(value) < 99.5 else f"{value:.0f}"

@@ -372,6 +372,6 @@ def test_a_recording_that_cannot_be_begun_is_not_tried_again(folder, texts, tmp_
     assert run_here(arguments) == 2
     assert "a.csv: pressure needs the diaphragm_area" in capsys.readouterr().err
     assert run_here(arguments) == 2
-    assert "1 recordings: 1 done before, 0 to do" in capsys.readouterr().err
+    assert "1 recording: 1 done before, 0 to do" in capsys.readouterr().err
     assert run_here([*arguments, "--retry-failed"]) == 2
     assert "1 to do, 1 of them again" in capsys.readouterr().err

@@ -83,6 +83,12 @@ def test_a_text_with_numbers_is_a_recording(tmp_path, row):
     assert findings.skipped == ("notes.txt",)
 
 
+def test_a_database_is_left_out_with_what_a_killed_process_leaves_beside_it(tmp_path):
+    for name in ("all.sqlite", "all.sqlite-wal", "all.sqlite-shm", "notes.txt"):
+        (tmp_path / name).touch()
+    assert find_recordings(tmp_path, tmp_path / "all.sqlite").skipped == ("notes.txt",)
+
+
 def test_a_bag_that_lost_its_storage_is_a_recording_to_complain_of(tmp_path):
     (tmp_path / "bag").mkdir()
     (tmp_path / "bag" / "metadata.yaml").write_text("rosbag2_bagfile_information: {}")

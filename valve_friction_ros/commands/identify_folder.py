@@ -86,6 +86,7 @@ from valve_friction_ros.records.files import explained, on_disk, place
 from valve_friction_ros.records.recordings import ReadingOptions
 from valve_friction_ros.records.valve_file import ValveFile, read_valve_file
 from valve_friction_ros.streams import utc_second
+from valve_friction_ros.wording import numbered
 
 
 @dataclass(frozen=True)
@@ -437,10 +438,12 @@ def _file(filings: Sequence[Filing], results: ResultsFile, options: argparse.Nam
     for entry in stale:
         cells = (filed.cells.get((entry.recording, str(row["valve"])), {}) for row in entry.rows)
         results.append([{**row, **own} for row, own in zip(entry.rows, cells, strict=True)])
-    told = [f"{filed.filed} results filed in {options.history}"]
-    told += [f"{filed.known} were there before"] if filed.known else []
+    told = [f"{numbered(filed.filed, 'result')} filed in {options.history}"]
+    told += [f"{filed.known} already there"] if filed.known else []
     if filed.baselines:
-        told.append(f"baseline of {len(filed.baselines)} valves: their first result")
+        told.append(
+            f"the first result is the baseline of {numbered(len(filed.baselines), 'valve')}"
+        )
     print("; ".join(told), file=sys.stderr)
 
 
@@ -457,9 +460,10 @@ def _run(options: argparse.Namespace, plans: Mapping[str, Plan], share_out: Shar
         ResultsFile(*options.output, zone=options.time_zone or "") as results,
     ):
         left, dropped = forget_stale(results, plans, options)
+        of_them = f", {dropped} of them again" if dropped else ""
         print(
-            f"{len(plans)} recordings: {len(plans) - len(left)} done before, {len(left)} to do"
-            + (f", {dropped} of them again" if dropped else ""),
+            f"{numbered(len(plans), 'recording')}: {len(plans) - len(left)} done before, "
+            f"{len(left)} to do{of_them}",
             file=sys.stderr,
         )
         for plan in left[:1]:

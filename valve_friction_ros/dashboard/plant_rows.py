@@ -25,7 +25,7 @@ from valve_friction_ros.history import HistoryEntry
 from valve_friction_ros.identification import SLIDING, UNITS
 from valve_friction_ros.outside_text import printable
 from valve_friction_ros.streams import utc
-from valve_friction_ros.wording import number_and_width, with_width
+from valve_friction_ros.wording import number_and_width, numbered, with_width
 
 
 def address_of(path: str, parts: Mapping[str, str]) -> str:
@@ -242,7 +242,7 @@ def summary(counts: Mapping[str, int]) -> str:
     if not total:
         return "No valve yet"
     others = [f"{n} {STATE_WORDS[state]}" for state, n in counts.items() if n and state != "ok"]
-    valves = f"{total} valve{'s' if total > 1 else ''}"
+    valves = numbered(total, "valve")
     return f"{valves}: {', '.join(others)}" if others else f"{valves}, all good"
 
 

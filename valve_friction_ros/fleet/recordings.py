@@ -132,6 +132,10 @@ def _is_bag_folder(folder: Path, files: list[str]) -> bool:
         return False
 
 
+_BESIDE = ("", "-wal", "-shm", "-nodes")
+"""Endings of a file and of those that a killed process leaves beside its database."""
+
+
 def find_recordings(folder: Path, *left_out: Path) -> Findings:
     """Find the recordings in a folder and its subfolders, on this machine or in a store.
 
@@ -143,7 +147,8 @@ def find_recordings(folder: Path, *left_out: Path) -> Findings:
     Raises ValueError if the folder does not exist or cannot be read.
     """
     with explained(folder):
-        return _findings(folder, {path.resolve() for path in left_out})
+        own = {Path(f"{path.resolve()}{end}") for path in left_out for end in _BESIDE}
+        return _findings(folder, own)
 
 
 def _findings(folder: Path, own: set[Path]) -> Findings:

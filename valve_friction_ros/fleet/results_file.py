@@ -27,7 +27,7 @@ from valve_friction_ros import __version__
 from valve_friction_ros.fleet.rows import COLUMNS, HEIGHT, PICTURE, WIDTH, Cell, ranked, status_of
 from valve_friction_ros.outside_text import csv_text, page_environment
 from valve_friction_ros.records.files import write_whole
-from valve_friction_ros.wording import in_zone, number_and_width, percentage
+from valve_friction_ros.wording import in_zone, number_and_width, numbered, percentage
 
 _Row = Mapping[str, Cell]
 _KEPT = (*COLUMNS, PICTURE)
@@ -292,7 +292,7 @@ def page_text(rows: Iterable[_Row], name: str, zone: str = "") -> str:
     others = [line for line in lines if not line["recording"]]
     # beside tags, a refused recording without one is no further valve
     valves = len(tagged) + sum(not tagged or one["status"].word != "refused" for one in others)
-    subject = "1 valve" if valves == 1 else f"{valves} valves"
+    subject = numbered(valves, "valve")
     if valves < len(lines):
         subject += f" in {len(lines)} recordings"
     return (

@@ -35,6 +35,7 @@ from valve_friction_ros.usage import (
     limit_states,
     warned_limits,
 )
+from valve_friction_ros.wording import numbered
 
 if TYPE_CHECKING:
     from valve_friction_ros.history import HistoryFile
@@ -165,8 +166,9 @@ class UsageWatch:
         await self._history.keep_change(renew)
         answer = (
             f"the packing is counted from {utc_day(now)}; the previous packing, "
-            f"{f'of {utc_day(since)}' if since else 'of unknown age'}: {used.distance:.6g} m of "
-            f"travel, {used.reversals} reversals, {used.breakaways} breakaways in "
+            f"{f'of {utc_day(since)}' if since else 'of unknown age'}: {used.distance:.3g} m of "
+            f"travel, {numbered(used.reversals, 'reversal')}, "
+            f"{numbered(used.breakaways, 'breakaway')} in "
             f"{used.time_watched / 3600e9:.3g} h monitored; its moves are no longer used as "
             f"evidence{self._history.reservation}"
         )
