@@ -407,11 +407,11 @@ def _frames(path: Path, form: Columns, places: Sequence[int] | None) -> Iterator
 def _excel(path: Path, form: Columns, places: Sequence[int] | None) -> Iterator["pd.DataFrame"]:
     import pandas as pd  # noqa: PLC0415 - slow to import
 
-    openpyxl = _library("openpyxl")
     with zipfile.ZipFile(path) as packed:
         if "[Content_Types].xml" not in packed.namelist():
             raise ValueError("an archive, but no workbook of Excel: unpack it, or save it as .xlsx")
         size = sum(each.file_size for each in packed.infolist()) / 1e6
+    openpyxl = _library("openpyxl")
     if size > form.maximum_megabytes:
         raise ValueError(
             f"{size:.4g} MB, unpacked: raise maximum_megabytes (--maximum-megabytes), or cut it"
