@@ -13,6 +13,7 @@ import gzip
 import json
 import os
 import sys
+import zipfile
 from datetime import datetime, timedelta, timezone
 from zoneinfo import ZoneInfo
 
@@ -213,9 +214,11 @@ class TestWorkbooks:
     def test_one_line_names_the_extra(self, refusal, valve, tmp_path, monkeypatch):
         monkeypatch.setitem(sys.modules, "openpyxl", None)
         monkeypatch.setitem(sys.modules, "pyarrow.parquet", None)
-        for content in (b"PK\x03\x04", b"PAR1"):
-            path = tmp_path / "export.bin"
-            path.write_bytes(content + bytes(100))
+        workbook, columns = tmp_path / "export.xlsx", tmp_path / "export.parquet"
+        with zipfile.ZipFile(workbook, "w") as packed:
+            packed.writestr("[Content_Types].xml", "")
+        columns.write_bytes(b"PAR1" + bytes(100))
+        for path in (workbook, columns):
             assert "pip install openpyxl pyarrow (the extra `tables`)" in refusal(
                 path, "--valve", valve()
             )

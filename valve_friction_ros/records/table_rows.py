@@ -321,8 +321,8 @@ _PAGE = re.compile(r"\s*<(\?xml|!doctype|html|table)\b", re.IGNORECASE)
 _JSON = re.compile(r'\s*(\{\s*"|\[\s*[\[{])')
 _CONTROL = re.compile(r"[\x01-\x08\x0e-\x19]")
 """Control characters that no text needs; zeros fill the end of some loggers' files."""
-_MOST_CONTROL = 0.01
-"""Largest share of these in a text. Chosen."""
+_MOST_CONTROL, _FEW_CONTROL = 0.01, 8
+"""Largest share of these in a text, and the number that any text may have. Chosen."""
 
 _ZIP = b"PK\x03\x04"
 
@@ -365,7 +365,7 @@ def _require_table(head: Sequence[str]) -> None:
         raise ValueError("a page in HTML or XML: save it from a spreadsheet as .xlsx or CSV")
     if _JSON.match(start):
         raise ValueError("JSON: save it as CSV, a row for each time")
-    if len(_CONTROL.findall(start)) > _MOST_CONTROL * len(start):
+    if len(_CONTROL.findall(start)) > max(_FEW_CONTROL, _MOST_CONTROL * len(start)):
         raise ValueError("a binary file: export it as CSV, .xlsx, Parquet or MAT (version 7)")
 
 

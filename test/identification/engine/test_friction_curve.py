@@ -32,7 +32,6 @@ from valve_friction_ros.identification.engine.friction_curve import (
 )
 from valve_friction_ros.identification.engine.intervals import Estimated
 from valve_friction_ros.identification.engine.lags import LagPrior
-from valve_friction_ros.identification.engine.method import identify_plant
 from valve_friction_ros.identification.engine.sliding_averages import (
     MeasuredSignal,
     _lengths,
@@ -45,7 +44,7 @@ from valve_friction_ros.identification.engine.verdicts import curve_verdicts
 from valve_friction_ros.identification.settings import IdentificationSettings
 from valve_friction_ros.identification.trust.verdict import Verdict
 from valve_friction_ros.model import Drive, KarnoppParameters, StemState, Valve, advance, simulate
-from valve_friction_ros.model.recording import Recording, StampedRecord, StampedSignal
+from valve_friction_ros.model.recording import StampedRecord, StampedSignal
 
 PERIOD = 1e-3
 TIME = np.arange(40_000) * PERIOD
@@ -158,19 +157,6 @@ class TestRecovery:
             assert not fixed.keys() & curve.numbers.keys()
             dry = curve.numbers["coulomb_friction"].value
             assert dry == pytest.approx(packing.coulomb_friction, rel=1e-3)
-
-    @pytest.mark.parametrize("side", [-0.09, 0.09])
-    def test_a_packing_that_holds_more_upward_is_within_the_interval_of_the_preload(self, side):
-        """No record tells F_c·a from F_0; 9 % are within the 95 % of packings that are expected."""
-        valve, packing = drawn(4)
-        packing = replace(packing, spring_preload=0.0)
-        uneven = replace(packing, coulomb_asymmetry=side)
-        record = moved(valve, uneven, WAVES)
-        every = Recording(0.01, record.drive.value[::10], record.position.value[::10])
-        preload = identify_plant(every, valve).parameters["spring_preload"]
-        shift = side * packing.coulomb_friction
-        assert preload.value == pytest.approx(shift, abs=0.1 * abs(shift))
-        assert abs(preload.value) < preload.half_width
 
     def test_noise_of_the_velocity_does_not_bias_its_friction(self):
         """Errors of one factor that the other does not share average out; they would draw F_v to 0.

@@ -34,7 +34,6 @@ from valve_friction_ros.identification.engine.balance_posterior import Posterior
 from valve_friction_ros.identification.engine.balance_regression import Regression
 from valve_friction_ros.identification.engine.coordinates import sensor_span, zero_drift
 from valve_friction_ros.identification.engine.intervals import (
-    ASYMMETRY,
     RECTANGLE,
     ROUNDING,
     Estimated,
@@ -427,22 +426,6 @@ def timed_numbers(curves: Sequence[FrictionCurve], lags: LagProfile | None) -> d
     return curve_numbers(curves)
 
 
-def with_asymmetry(numbers: Mapping[str, Estimated]) -> dict[str, Estimated]:
-    """Return numbers of a force balance whose preload may come from a packing that is asymmetric.
-
-    A friction that is larger upward shifts the whole balance, as in `reported_numbers`.
-    """
-    result = dict(numbers)
-    if {"spring_preload", "coulomb_friction"} <= result.keys():
-        one, shift = result["spring_preload"], ASYMMETRY * result["coulomb_friction"].value
-        result["spring_preload"] = replace(
-            one,
-            half_width=math.hypot(one.half_width, NORMAL_QUANTILE * shift),
-            record=math.hypot(one.record, shift),
-        )
-    return result
-
-
 def _agree(one: Estimated, other: Estimated) -> bool:
     """Return whether two numbers differ by no more than both intervals together."""
     return abs(one.value - other.value) <= math.hypot(one.half_width, other.half_width)
@@ -467,7 +450,7 @@ def checked_by_curve(
     viscous friction is uncertain by the difference of the two, and F_c also by a `slip_force`, N,
     since the speed at which it vanishes is unknown.
     """
-    result, balanced = dict(simulated), with_asymmetry(balanced)
+    result = dict(simulated)
     viscous = simulated.get("viscous_friction")
     is_split = viscous is not None and viscous.half_width < viscous.value
     for name in ("coulomb_friction", "viscous_friction"):

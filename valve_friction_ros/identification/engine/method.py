@@ -31,7 +31,6 @@ from valve_friction_ros.identification.engine.friction_curve import (
     curve_numbers,
     friction_curves,
     timed_numbers,
-    with_asymmetry,
 )
 from valve_friction_ros.identification.engine.intervals import (
     ASYMMETRY,
@@ -370,8 +369,7 @@ def _of_force_balance(
     force_range: float,
 ) -> _Outcome:
     """Use the force balance of the sliding stem alone; `why` says why no stem was simulated."""
-    numbers = with_asymmetry(numbers)
-    numbers.pop(SPEED_EXPONENT, None)
+    numbers = {name: one for name, one in numbers.items() if name != SPEED_EXPONENT}
     best = next(one for one in curves if one.numbers[SLIDING].value == numbers[SLIDING].value)
     misfit = verdicts.curve_misfit(best, numbers[SLIDING])
     reproduced = f"the force balance reproduces {100 * misfit.fit:.2f} % of the force"
