@@ -436,7 +436,7 @@ class TestNoBags:
             ("a.bag", b"#ROSBAG V2.0\n    ", "a ROS 1 bag: convert it with rosbags-convert"),
             (
                 "record.mcap",
-                gzip.compress(b"time_s,position_m,pressure_pa\n"),
+                gzip.compress(b"time_s,position_m,pressure_pa\n", mtime=0),
                 "neither MCAP nor SQLite3, despite its name: record it again",
             ),
         ],
