@@ -559,9 +559,8 @@ class _Valve:
             return
         self._mark, self._looked = mark, latest
 
-    def whole(self, node: str) -> ValveView:
-        """Return the view with all values; the same object until the next status."""
-        self.look(node)
+    def whole(self) -> ValveView:
+        """Return the view with all values, after a look; the same object until the next status."""
         if self.latest is not None and self.latest is not self._read:
             with contextlib.suppress(ValueError):
                 self._whole = replace(self.view, values=self.latest.read().values)
@@ -641,8 +640,8 @@ class Plant:
         with self._lock:
             if (valve := self._valves.get(node)) is None:
                 return None
-            view = valve.whole(node)
-            return replace(self._heard(node, valve, now), view=view)
+            heard = self._heard(node, valve, now)
+            return replace(heard, view=valve.whole())
 
     def _heard(self, node: str, valve: _Valve, now: float) -> Heard:
         valve.look(node)

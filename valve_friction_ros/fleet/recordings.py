@@ -23,6 +23,7 @@ import yaml
 
 from valve_friction_ros.health import Baseline, Measured, SlidingFriction
 from valve_friction_ros.health.valve_numbers import COMPARED, IDENTIFIED_ONLY, fit_numbers
+from valve_friction_ros.history.place import BESIDE_ENDINGS
 from valve_friction_ros.identification import Verdict
 from valve_friction_ros.identification.settings import column_suffix
 from valve_friction_ros.outside_text import as_read, nearest, resembling
@@ -132,10 +133,6 @@ def _is_bag_folder(folder: Path, files: list[str]) -> bool:
         return False
 
 
-_BESIDE = ("", "-wal", "-shm", "-nodes")
-"""Endings of a file and of those that a killed process leaves beside its database."""
-
-
 def find_recordings(folder: Path, *left_out: Path) -> Findings:
     """Find the recordings in a folder and its subfolders, on this machine or in a store.
 
@@ -147,7 +144,8 @@ def find_recordings(folder: Path, *left_out: Path) -> Findings:
     Raises ValueError if the folder does not exist or cannot be read.
     """
     with explained(folder):
-        own = {Path(f"{path.resolve()}{end}") for path in left_out for end in _BESIDE}
+        endings = ("", *BESIDE_ENDINGS)
+        own = {Path(f"{path.resolve()}{end}") for path in left_out for end in endings}
         return _findings(folder, own)
 
 

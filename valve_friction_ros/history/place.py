@@ -143,6 +143,9 @@ def file_state(path: Path) -> tuple[FileStamp, FileStamp]:
 _CLAIMS_ENDING = "-nodes"
 """Suffix of the claims file after the name of the history; the file has no content."""
 
+BESIDE_ENDINGS = ("-wal", "-shm", _CLAIMS_ENDING)
+"""Suffixes of the files that an open database may have beside it, and a killed process leaves."""
+
 _CLAIM_PLACES = 2**62
 
 

@@ -15,6 +15,7 @@ This module has no clock and no bus: its caller gives the time and the received 
 import math
 from dataclasses import dataclass
 from enum import Enum, auto
+from typing import NamedTuple
 
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.model.excitations import SampledPressure
@@ -90,6 +91,17 @@ class PlayLimits:
                 raise ValueError(f"{name} must be above 0 s, got {getattr(self, name):g}")
 
 
+class _Doubt(NamedTuple):
+    """Why a test must not go on: the value found, and its limit."""
+
+    why: Abort
+    found: float
+    limit: float
+
+    def __str__(self) -> str:
+        return played_test_words(self.why.name, self.found, self.limit)
+
+
 class PlayedTest:
     """A stroke test that is played once per start, and returns to its initial pressure on an abort.
 
@@ -115,8 +127,8 @@ class PlayedTest:
         self.phase, self.aborted = PlayPhase.WAITING, None
         self._begun = self._stepped = 0.0
         self._heard: dict[str, tuple[float, float]] = {}
-        self._told: tuple[float, float] = (math.nan, math.nan)
-        self._pending: Abort | None = None
+        self._found, self._limit = math.nan, math.nan
+        self._pending: _Doubt | None = None
         if self.duration > limits.duration:
             raise ValueError(
                 f"the test takes {self.duration:g} s, but only {limits.duration:g} s are allowed: "
@@ -148,24 +160,22 @@ class PlayedTest:
         if self.phase is PlayPhase.PLAYING and self._pending is None:
             self._pending = self._beyond(name)
 
-    def _beyond(self, name: str) -> Abort | None:
-        """Return the abort if the last sample of a signal is beyond its limits, or nan."""
+    def _beyond(self, name: str) -> _Doubt | None:
+        """Return the doubt if the last sample of a signal is beyond its limits, or nan."""
         low, high = getattr(self.limits, name)
         value, _ = self._heard[name]
         if low <= value <= high:
             return None
-        self._told = value, (low if value < low else high)
-        return Abort[name.upper()]
+        return _Doubt(Abort[name.upper()], value, low if value < low else high)
 
-    def _doubt(self, now: float) -> Abort | None:
+    def _doubt(self, now: float) -> _Doubt | None:
         for name, silent in (
             ("position", Abort.SILENT_STEM),
             ("pressure", Abort.SILENT_PRESSURE),
         ):
             _, at = self._heard.get(name, (math.nan, -math.inf))
             if not now - at <= self.limits.silence:
-                self._told = now - at, self.limits.silence
-                return silent
+                return _Doubt(silent, now - at, self.limits.silence)
             if (beyond := self._beyond(name)) is not None:
                 return beyond
         return None
@@ -178,11 +188,8 @@ class PlayedTest:
         """
         if self.phase is PlayPhase.PLAYING:
             raise RefusalError("the test is running: stop it first")
-        before = self._told
-        doubt = self._doubt(now)
-        if doubt is not None:
-            words, self._told = self._words(doubt), before  # the last return keeps its numbers
-            raise RefusalError(f"nothing is played: {words}")
+        if (doubt := self._doubt(now)) is not None:
+            raise RefusalError(f"nothing is played: {doubt}")
         self.phase, self.aborted, self._pending = PlayPhase.PLAYING, None, None
         self._begun = self._stepped = now
 
@@ -199,24 +206,22 @@ class PlayedTest:
             late = now - self._stepped
             doubt = self._pending or self._doubt(now)
             if doubt is None and late > self.limits.silence:
-                self._told = late, self.limits.silence
-                doubt = Abort.HELD_UP
+                doubt = _Doubt(Abort.HELD_UP, late, self.limits.silence)
             self._stepped = now
             if doubt is not None:
-                self.abort(doubt)
+                self.abort(doubt.why)
+                self._found, self._limit = doubt.found, doubt.limit
             elif now - self._begun >= self.duration:
                 self.phase = PlayPhase.ENDED
         if self.phase is PlayPhase.BACK:
             return self.home
         return float(self.signal.sample(min(now - self._begun, self.duration)))
 
-    def _words(self, why: Abort) -> str:
-        return played_test_words(why.name, *self._told)
-
     def __str__(self) -> str:
         """Return the state of the test, on one line."""
         if self.phase is PlayPhase.BACK and self.aborted is not None:
-            return f"returned to {self.home / 1e3:.4g} kPa: {self._words(self.aborted)}"
+            why = _Doubt(self.aborted, self._found, self._limit)
+            return f"returned to {self.home / 1e3:.4g} kPa: {why}"
         return {
             PlayPhase.WAITING: "waiting for start",
             PlayPhase.PLAYING: f"plays for {self.duration:.4g} s",

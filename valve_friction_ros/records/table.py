@@ -76,7 +76,7 @@ class ReadSignal:
     bad: Counter[str] = field(default_factory=Counter)
     example: tuple[int, str, str] = (0, "", "")
 
-    def where(self, kept: "NDArray[np.bool_ | np.int64] | slice") -> "ReadSignal":
+    def where(self, kept: NDArray[np.bool_] | slice) -> "ReadSignal":
         """Return the selected samples."""
         return replace(
             self, stamps=self.stamps[kept], values=self.values[kept], rows=self.rows[kept]
@@ -320,13 +320,13 @@ def _without_dropouts(read: ReadSignal) -> ReadSignal:
     lone = is_zero[1:-1] & (before * after > 0) & (fall > _LEAST_FALL * np.abs(after - before))
     steps = np.abs(np.diff(values))[~(is_zero[1:] | is_zero[:-1])]
     lone &= fall > _LEAST_FALL * (np.quantile(steps, 0.99) if steps.size else 0.0)
-    places = np.flatnonzero(lone) + 1
-    if not places.size:
+    if not lone.any():
         return read
-    read.bad[_DROPOUT] += places.size
+    kept = np.pad(~lone, 1, constant_values=True)
+    read.bad[_DROPOUT] += int(np.sum(lone))
     if not read.example[0]:
-        read.example = (int(read.rows[places[0]]), read.signal.name, _DROPOUT)
-    return read.where(np.delete(np.arange(values.size), places))
+        read.example = (int(read.rows[~kept][0]), read.signal.name, _DROPOUT)
+    return read.where(kept)
 
 
 def layout_of(path: Path, form: Columns, is_part: bool = False) -> Layout:

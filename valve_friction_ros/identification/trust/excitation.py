@@ -187,7 +187,7 @@ def require_two_directions(recording: Recording, window: int, travel: float = ma
     elastic = _ELASTIC * travel if math.isfinite(travel) else 0.0
     shorter = max(int(_SHORT_MOVE / recording.sample_period), _FEWEST_AVERAGED)
     ways = []
-    for length in (window, min(window, shorter)):
+    for length in dict.fromkeys((window, min(window, shorter))):
         means = len(recording) // length
         position = recording.position[: means * length].reshape(means, length).mean(axis=1)
         noise = measured(recording).white_noise / np.sqrt(length)

@@ -47,6 +47,7 @@ from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.nodes.identifier.workers import HistoryThread
 from valve_friction_ros.nodes.plumbing.worker import InternalError, bugs_reported, done_in
 from valve_friction_ros.streams import END_OF_TIME, utc_second
+from valve_friction_ros.wording import numbered
 
 if TYPE_CHECKING:
     from valve_friction_ros.history import HistoryFile, Sender
@@ -99,8 +100,7 @@ class WaitingChanges:
     def given_up(self) -> str:
         """The numbers of dropped changes, in words; empty without any."""
         counts = (self._identifications, "identification"), (self._others, "other change")
-        told = [f"{count} {what}{'s' * (count > 1)}" for count, what in counts if count]
-        return " and ".join(told)
+        return " and ".join(numbered(count, what) for count, what in counts if count)
 
     def forget_given_up(self) -> None:
         """Reset the numbers of dropped changes."""
