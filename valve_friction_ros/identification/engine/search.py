@@ -413,11 +413,12 @@ class _Search:
         """Fit without a lag, from the linear model or from viscous friction in place of the lag."""
         delayed = at["viscous_friction"] + lag_of(at) * at["spring_constant"]
         replaced = {**at, **dict.fromkeys(TIMING, 0.0), "viscous_friction": delayed}
-        start = dict(nearest(self.exact, [self.along(best, at, 0.0), replaced]))
-        # A stem that swings has no derivatives that can be trusted.
-        least = SWINGING * start["spring_constant"]
-        start["viscous_friction"] = max(start["viscous_friction"], least)
-        return self.fit(start, best.names, _FEW_STEPS, self.exact, 0.0)
+        starts = [dict(one) for one in (self.along(best, at, 0.0), replaced)]
+        for start in starts:
+            # A stem that swings takes long, and has no derivatives that can be trusted.
+            least = SWINGING * start["spring_constant"]
+            start["viscous_friction"] = max(start["viscous_friction"], least)
+        return self.fit(nearest(self.exact, starts), best.names, _FEW_STEPS, self.exact, 0.0)
 
     def along(self, best: PosteriorFit, at: Coordinates, lag: float) -> Coordinates:
         """Return the point at a lag, s, to which the linear model of the best fit leads."""
