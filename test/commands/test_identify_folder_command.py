@@ -18,6 +18,7 @@ import signal
 import subprocess
 import sys
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -58,7 +59,9 @@ def noisy(short_record):
 
 
 def csv_text(record):
-    rows = zip(np.round(record.time, 9), record.position, record.pressure, strict=True)
+    rows = zip(
+        np.round(record.start_time + record.time, 9), record.position, record.pressure, strict=True
+    )
     lines = [f"{time!r},{x!r},{p!r}\n" for time, x, p in (map(float, row) for row in rows)]
     return "time_s,position_m,pressure_pa\n" + "".join(lines)
 
@@ -246,6 +249,27 @@ def test_a_page_against_baselines(folder, texts, tmp_path, output, arguments, ca
     healthy.write_text("recording,coulomb_friction_n\nelsewhere.csv,606\n")
     assert run_here(arguments) == 2
     assert "no recording of" in capsys.readouterr().err
+
+
+def test_only_the_newest_diagnosis_of_a_tag_fails_the_command(
+    folder, noisy, tmp_path, output, capsys
+):
+    """A valve that was repaired is no alarm; a refused record does not end one."""
+    still = replace(noisy(2), position=np.full_like(noisy(2).position, 0.01))
+    for month, record in enumerate((noisy(0), noisy(1), still), start=1):
+        text = csv_text(replace(record, start_time=1.7e9 + 2.6e6 * month))
+        (folder / f"FV-1 {month}.csv").write_text(text)
+    plant, healthy = tmp_path / "plant.csv", tmp_path / "healthy.csv"
+    plant.write_text("tag,area,travel,reference\nFV-1,445 cm2,28.575 mm,41.74 kPa\n")
+    arguments = ["identify-folder", str(folder), "--output", str(output), "--method", "bench"]
+    arguments += ["--plant", str(plant), "--baselines", str(healthy), "--fail-on", "warn"]
+    arguments += ["--jobs", "1", "--redo"]
+    lines = "recording,coulomb_friction_n\nFV-1 1.csv,{}\nFV-1 2.csv,{}\n"
+    for first, second, code in ((250, 606, 1), (606, 250, 3)):
+        healthy.write_text(lines.format(first, second))
+        assert run_here(arguments) == code
+        out, err = capsys.readouterr()
+        assert ("times its baseline" in out) == (code == 3), (out, err)
 
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])

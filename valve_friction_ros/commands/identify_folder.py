@@ -66,6 +66,7 @@ from valve_friction_ros.fleet.results_file import (
 from valve_friction_ros.fleet.rows import (
     Cell,
     error_cells,
+    level_of,
     ranked,
     reaches,
     with_reports_written,
@@ -312,12 +313,16 @@ def print_alarms(rows: Iterable[Mapping[str, Cell]]) -> None:
 
 
 def _newest(rows: Sequence[Mapping[str, Cell]]) -> list[Mapping[str, Cell]]:
-    """Leave out the records of a tag that a later one has overtaken."""
+    """Return the diagnosed records that no later one of the same tag has overtaken.
+
+    A later record without a diagnosis, such as a refused one, overtakes nothing.
+    """
+    diagnosed = [row for row in rows if row["level"]]
     last: dict[str, str] = {}
-    for row in rows:
+    for row in diagnosed:
         tag = str(row["valve"])
         last[tag] = max(last.get(tag, ""), str(row["began"] or ""))
-    return [row for row in rows if not row["began"] or row["began"] == last[str(row["valve"])]]
+    return [row for row in diagnosed if not row["began"] or row["began"] == last[str(row["valve"])]]
 
 
 def _require_sense(options: argparse.Namespace) -> None:
@@ -482,10 +487,11 @@ def _run(options: argparse.Namespace, plans: Mapping[str, Plan], share_out: Shar
             return stop.exit_code
     counted, rows = tally(mine), [row for entry in mine for row in entry.rows]
     print_tally(counted)
-    print_alarms(rows if options.plant is None else _newest(rows))
+    present = rows if options.plant is None else _newest(rows)
+    print_alarms(present)
     refused = counted.outcomes[REFUSED]
     if refused == counted.outcomes.total():
         return ExitCode.REFUSED
-    if has_failed(options, (Level[str(row["level"])] for row in rows if row["level"])):
+    if has_failed(options, filter(None, map(level_of, present))):
         return ExitCode.ALARM
     return ExitCode.PARTLY if refused else ExitCode.DONE

@@ -357,7 +357,8 @@ def _held_cells(diagnosis: Diagnosis) -> Mapping[str, Cell]:
 def _cells(job: Job, recorded: RecordedValve) -> Mapping[str, Cell]:
     options = job.options
     name = options.tag or recorded.name
-    baseline = options.baselines.get(name) or job.baseline
+    stated = options.baselines
+    baseline = stated.get(name) or stated.get(recorded.name) or job.baseline
     try:
         recording = recorded.recording()
     except RefusalError as refusal:

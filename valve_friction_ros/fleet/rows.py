@@ -170,7 +170,7 @@ def _friction_level(row: Mapping[str, Cell]) -> Level | None:
     return Level[str(row["level"])] if row.get("level") else None
 
 
-def _level(row: Mapping[str, Cell]) -> Level | None:
+def level_of(row: Mapping[str, Cell]) -> Level | None:
     """Return the level of friction and findings together; None for a refused valve."""
     own, others = _friction_level(row), row.get("findings_level")
     return own if own is None or not others else max(own, Level[str(others)])
@@ -183,7 +183,7 @@ def _number(row: Mapping[str, Cell], name: str) -> float:
 
 def status_of(row: Mapping[str, Cell]) -> RowStatus:
     """Return the status of a valve, coloured ``error``, ``warn``, ``maybe``, ``ok`` or ``none``."""
-    level, ratio = _level(row), _number(row, "ratio")
+    level, ratio = level_of(row), _number(row, "ratio")
     if level is None:
         return RowStatus("refused", "none")
     if row.get("error"):  # refused, but its test shows what held the stem
@@ -213,7 +213,7 @@ def _status_of_ratio(ratio: float) -> RowStatus:
 
 def _need(row: Mapping[str, Cell]) -> tuple[float, float, float, float, str, str]:
     """Return the sort key that puts the valve most in need of attention first."""
-    level, ratio = _level(row), _number(row, "ratio")
+    level, ratio = level_of(row), _number(row, "ratio")
     change = abs(math.log(ratio)) if ratio > 0 else -math.inf
     severity = -1.0 if level is None else float(level)
     names = (str(row["recording"]), str(row["valve"]))
@@ -232,7 +232,7 @@ def ranked(rows: Iterable[Mapping[str, Cell]]) -> list[Mapping[str, Cell]]:
 
 def reaches(row: Mapping[str, Cell], level: Level) -> bool:
     """Return whether the diagnosis of a row is at least as severe as `level`."""
-    found = _level(row)
+    found = level_of(row)
     return found is not None and found >= level
 
 
