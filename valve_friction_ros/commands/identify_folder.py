@@ -405,10 +405,7 @@ def _planned(options: argparse.Namespace) -> dict[str, Plan]:
 def _identify(
     plans: Sequence[Plan], results: ResultsFile, share_out: ShareOut, stop: StopSignals
 ) -> list[Filing]:
-    """Identify the recordings, write their rows and show the progress; return what to file.
-
-    Each reason for refusals is shown once; the tally gives their number.
-    """
+    """Identify the recordings, write their rows and show the progress; return what to file."""
     filings: list[Filing] = []
     shown: set[str] = set()
     columns = (TextColumn("identifying"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())

@@ -16,7 +16,7 @@ import math
 import sys
 import threading
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -141,9 +141,9 @@ class StrokePlayer(PacedNode):
             self.get_logger().info(now[1])
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
+def main() -> int:
     """Run the node."""
-    return run_nodes(lambda: [StrokePlayer()], arguments)
+    return run_nodes(lambda: [StrokePlayer()])
 
 
 if __name__ == "__main__":

@@ -560,10 +560,10 @@ class Identifier(ManagedNode):
         self._publish(status)
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
+def main() -> int:
     """Run the node."""
     with running_workers(_PROCESSES) as workers:
-        return run_nodes(lambda: [Identifier(workers)], arguments)
+        return run_nodes(lambda: [Identifier(workers)])
 
 
 if __name__ == "__main__":
