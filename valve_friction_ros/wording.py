@@ -611,11 +611,10 @@ _FORMATS: dict[str, Callable[[Any, str], str]] = {
     "percent": lambda share, _: percentage(share),
     "second": lambda time, _: utc_second(time),
     "times": lambda change, _: _ratio(change, ".3g", " times"),
-    "two": lambda value, unit: two_digits(_SIZES.get(unit, 1.0) * value),
     "words": lambda name, _: name_in_words(name),
 }
-"""Formats of facts: ``{fact:name details}``. ``{fact:?this|that}`` chooses by a fact, and
-``{fact:+...}`` writes a fact only if it is known. Everything else is Python's own format."""
+"""Formats of facts: ``{fact:name details}``. ``{fact:?this|that}`` chooses by a fact. Everything
+else is Python's own format, of a fact that is known."""
 
 
 class _Writer(string.Formatter):
