@@ -218,7 +218,7 @@ def forget_stale(
         if plan is None:
             continue
         if (entry.content, entry.settings) == (plan.content, plan.settings):
-            is_again = options.retry_failed and entry.failed
+            is_again = options.retry_failed and any(row["error"] for row in entry.rows)
             if not is_again and _is_whole(entry, plan, filed):
                 done.add(entry.recording)
         elif entry.content == plan.content and entry.settings != plan.settings:
