@@ -46,7 +46,7 @@ from valve_friction_ros.planning import (
     plan_test,
     unknown_friction,
 )
-from valve_friction_ros.planning.played_test import Abort, PlayedTest, PlayLimits, PlayPhase
+from valve_friction_ros.planning.played_test import PlayedTest, PlayLimits, PlayPhase
 from valve_friction_ros.planning.search import forecast, moved
 from valve_friction_ros.planning.stroke_test import (
     SHAPES,
@@ -57,6 +57,7 @@ from valve_friction_ros.planning.stroke_test import (
     stroke,
     stroke_test,
 )
+from valve_friction_ros.wording import Code, said
 
 SPRING = (2.05e5, 231.65)
 
@@ -470,11 +471,19 @@ def test_the_set_points_are_those_of_the_file_and_the_last_one_stays():
 @pytest.mark.parametrize(
     ("change", "why", "words"),
     [
-        ({"position": 0.0201}, Abort.POSITION, "reached 0.0201 m, beyond its limit of 0.02"),
-        ({"position": 0.0019}, Abort.POSITION, "beyond its limit of 0.002 m"),
-        ({"position": math.nan}, Abort.POSITION, "the stem reached nan m"),
-        ({"pressure": 1.51e5}, Abort.PRESSURE, "151000 Pa, beyond its limit of 150000 Pa"),
-        ({"pressure": 0.89e5}, Abort.PRESSURE, "beyond its limit of 90000 Pa"),
+        (
+            {"position": 0.0201},
+            Code.POSITION_BEYOND_LIMIT,
+            "reached 0.0201 m, beyond its limit of 0.02",
+        ),
+        ({"position": 0.0019}, Code.POSITION_BEYOND_LIMIT, "beyond its limit of 0.002 m"),
+        ({"position": math.nan}, Code.POSITION_BEYOND_LIMIT, "the stem reached nan m"),
+        (
+            {"pressure": 1.51e5},
+            Code.PRESSURE_BEYOND_LIMIT,
+            "151000 Pa, beyond its limit of 150000 Pa",
+        ),
+        ({"pressure": 0.89e5}, Code.PRESSURE_BEYOND_LIMIT, "beyond its limit of 90000 Pa"),
     ],
 )
 def test_a_violation_goes_back_with_the_next_set_point(change, why, words):
@@ -483,15 +492,15 @@ def test_a_violation_goes_back_with_the_next_set_point(change, why, words):
     hear(test, 102.0, **change)
     hear(test, 102.01)
     assert test.step(102.02) == test.home == 1e5
-    assert (test.phase, test.aborted) == (PlayPhase.BACK, why)
+    assert (test.phase, test.aborted.code) == (PlayPhase.BACK, why)
     assert words in str(test)
     hear(test, 103.0)
     assert test.step(103.0) == 1e5
-    assert test.aborted is why
+    assert test.aborted.code is why
 
 
 @pytest.mark.parametrize(
-    ("name", "why"), [("position", Abort.SILENT_STEM), ("pressure", Abort.SILENT_PRESSURE)]
+    ("name", "why"), [("position", Code.STEM_SILENT), ("pressure", Code.PRESSURE_SILENT)]
 )
 def test_a_signal_that_is_lost_goes_back_after_its_silence(name, why):
     test = started()
@@ -500,7 +509,7 @@ def test_a_signal_that_is_lost_goes_back_after_its_silence(name, why):
         now += PLAY_STEP
         hear(test, now, **{name: None})
         test.step(now)
-    assert test.aborted is why
+    assert test.aborted.code is why
     assert 100.0 + PLAY_LIMITS.silence < now <= 100.0 + PLAY_LIMITS.silence + 2 * PLAY_STEP
 
 
@@ -508,22 +517,22 @@ def test_a_player_that_stood_still_goes_back_in_place_of_a_jump():
     test = started(101.0)
     hear(test, 102.5)
     assert test.step(102.5) == test.home
-    assert test.aborted is Abort.HELD_UP
+    assert test.aborted.code is Code.PLAYER_STALLED
 
 
 def test_who_asks_gets_it_back_at_once():
     test = started(102.0)
-    test.abort(Abort.SHUTDOWN)
+    test.abort(said(Code.PLAYER_SHUT_DOWN))
     hear(test, 102.0)
     assert test.step(102.0) == test.home
-    assert test.aborted is Abort.SHUTDOWN
+    assert test.aborted.code is Code.PLAYER_SHUT_DOWN
 
 
 def test_it_can_be_started_again_after_each_end_and_not_while_it_plays():
     test = started()
     with pytest.raises(RefusalError, match="is running"):
         test.start(100.0)
-    test.abort(Abort.ASKED)
+    test.abort(said(Code.PLAYER_STOPPED))
     hear(test, 200.0)
     test.start(200.0)
     assert test.aborted is None

@@ -26,10 +26,11 @@ import ssl
 import threading
 import time
 import uuid
-from collections import deque
+from collections import defaultdict, deque
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from datetime import datetime, timezone
+from functools import partial
 from itertools import accumulate, repeat
 from typing import NamedTuple, Protocol
 from urllib.parse import SplitResult, unquote, urlsplit
@@ -408,10 +409,6 @@ _TRIES = 20
 WAITS = tuple(accumulate(repeat(1.0, _TRIES - 1), lambda wait, _: min(2 * wait, _LONGEST_WAIT)))
 """Waiting times between attempts, s: 1, 2, 4 … 300; an hour in all."""
 
-_MOST_TRIES, _MOST_RETRIES = 16, 8
-"""Largest number of hosts tried at once, and of those that did not answer the last attempt. Dead
-hosts thus leave room for the others."""
-
 _MOST_WAITING = 100
 """Largest number of waiting alerts per valve; beyond it the oldest is given up."""
 
@@ -523,11 +520,11 @@ class Outbox:
 
 
 class AlertSender:
-    """Sends the alerts of many valves in its own threads, started with the first alert.
+    """Sends the alerts of many valves, to each host in a thread that starts with its first alert.
 
-    One thread schedules the attempts. Each attempt runs in a thread, at most one per host and 16 in
-    all, so that a slow or dead host does not delay the alerts to the others. The threads block
-    neither their callers nor the exit of the process; alerts that still wait at exit are lost.
+    A host thus gets one attempt at a time, and a slow or dead host does not delay the alerts to the
+    others. The threads block neither their callers nor the exit of the process; alerts that still
+    wait at exit are lost.
 
     Parameters
     ----------
@@ -546,71 +543,56 @@ class AlertSender:
         self._waits = tuple(waits)
         self._limit = limit
         self._changed = threading.Condition()
-        self._outboxes: list[Outbox] = []
-        self._under_way: dict[Place, bool] = {}
-        """Hosts with an attempt under way, and whether they failed to answer the last attempt."""
-        self._silent: set[Place] = set()
+        self._outboxes: defaultdict[Place, list[Outbox]] = defaultdict(list)
+        self._begun: set[Place] = set()
         self._is_closed = False
-        self._thread: threading.Thread | None = None
 
     def outbox(self, webhook: Webhook) -> Outbox:
         """Return a new queue for one valve and its webhook."""
-        outbox = Outbox(webhook, self._changed, self._waits, self._wake)
+        outbox = Outbox(webhook, self._changed, self._waits, partial(self._wake, webhook.place))
         with self._changed:
-            self._outboxes.append(outbox)
+            self._outboxes[webhook.place].append(outbox)
         return outbox
 
-    def _wake(self) -> None:
-        """Wake the scheduling thread; the caller holds the lock."""
-        if self._thread is None and not self._is_closed:
-            self._thread = threading.Thread(target=self._run, name="alerts", daemon=True)
-            self._thread.start()
-        self._changed.notify()
+    def _wake(self, place: Place) -> None:
+        """Wake the thread of a host; the caller holds the lock."""
+        if place not in self._begun and not self._is_closed:
+            self._begun.add(place)
+            work = (self._outboxes[place],)
+            threading.Thread(target=self._run, args=work, name="alerts", daemon=True).start()
+        self._changed.notify_all()
 
     def close(self) -> None:
         """Start no more attempts; returns at once, though some may still be under way."""
         with self._changed:
             self._is_closed = True
-            self._changed.notify()
+            self._changed.notify_all()
 
-    def _run(self) -> None:
-        """Start the attempts that are due, until closed."""
+    def _run(self, outboxes: list[Outbox]) -> None:
+        """Try the alerts to one host as they become due, until closed."""
+        while (work := self._next(outboxes)) is not None:
+            outbox, letter = work
+            failure = self._failure(letter, outbox.webhook)
+            with self._changed:
+                outbox.end(failure)
+                if failure is not None and not failure.is_answered:
+                    # A dead host shared by many valves is tried once per round.
+                    now = time.monotonic()
+                    for other in outboxes:
+                        if other.due() <= now:
+                            other.end(failure)
+
+    def _next(self, outboxes: list[Outbox]) -> tuple[Outbox, Letter] | None:
+        """Wait for the next attempt, and return it; None once closed."""
         with self._changed:
             while not self._is_closed:
                 now = time.monotonic()
-                for outbox in sorted(self._outboxes, key=lambda one: one.tried):
-                    if outbox.due() <= now:
-                        self._begin(outbox)
-                later = [due for one in self._outboxes if now < (due := one.due()) < math.inf]
-                self._changed.wait(min(later) - now if later else None)
-
-    def _begin(self, outbox: Outbox) -> None:
-        """Try the first alert of a queue if a thread is free."""
-        place = outbox.webhook.place
-        if place in self._under_way:
-            return
-        is_silent, retries = place in self._silent, sum(self._under_way.values())
-        if len(self._under_way) >= _MOST_TRIES or (is_silent and retries >= _MOST_RETRIES):
-            return
-        self._under_way[place] = is_silent
-        work = outbox, outbox.begin()
-        threading.Thread(target=self._try, args=work, name="alert", daemon=True).start()
-
-    def _try(self, outbox: Outbox, letter: Letter) -> None:
-        place, failure = outbox.webhook.place, self._failure(letter, outbox.webhook)
-        with self._changed:
-            outbox.end(failure)
-            del self._under_way[place]
-            if failure is None or failure.is_answered:
-                self._silent.discard(place)
-            else:
-                self._silent.add(place)
-                # A dead host shared by many valves is tried once per round.
-                now = time.monotonic()
-                for other in self._outboxes:
-                    if other.webhook.place == place and other.due() <= now:
-                        other.end(failure)
-            self._changed.notify()
+                if due := [one for one in outboxes if one.due() <= now]:
+                    outbox = min(due, key=lambda one: one.tried)
+                    return outbox, outbox.begin()
+                later = min(one.due() for one in outboxes)
+                self._changed.wait(None if later == math.inf else later - now)
+        return None
 
     def _failure(self, letter: Letter, webhook: Webhook) -> DeliveryError | None:
         try:

@@ -265,6 +265,16 @@ class Code(Enum):
     LIMIT_REACHED = ": reached"
     LIMIT_EXPECTED = ", expected on {expected:day}"
     LIMIT_NEAR = ", close to its limit (previously warned)"
+    # Why a stroke test that is played returns to its start
+    POSITION_BEYOND_LIMIT = "the stem reached {found:.4g} m, beyond its limit of {limit:.4g} m"
+    PRESSURE_BEYOND_LIMIT = (
+        "the measured pressure was {found:.6g} Pa, beyond its limit of {limit:.6g} Pa"
+    )
+    STEM_SILENT = "no stem position has been received {found:silent} (limit {limit:g} s)"
+    PRESSURE_SILENT = "no pressure has been received {found:silent} (limit {limit:g} s)"
+    PLAYER_STALLED = "the player stalled for {found:.2g} s (limit {limit:g} s)"
+    PLAYER_STOPPED = "an operator stopped it"
+    PLAYER_SHUT_DOWN = "the player was shut down"
 
 
 @dataclass(frozen=True)
@@ -451,25 +461,6 @@ def misfit_words(misfit: float, unit: str) -> str:
     return f"{1e6 * misfit:.3g} µm" if unit == "m" else f"{misfit:.3g} {unit}"
 
 
-_ABORTS = {
-    "POSITION": "the stem reached {0:.4g} m, beyond its limit of {1:.4g} m",
-    "PRESSURE": "the measured pressure was {0:.6g} Pa, beyond its limit of {1:.6g} Pa",
-    "SILENT_STEM": "no stem position has been received {0} (limit {1:g} s)",
-    "SILENT_PRESSURE": "no pressure has been received {0} (limit {1:g} s)",
-    "HELD_UP": "the player stalled for {0:.2g} s (limit {1:g} s)",
-    "ASKED": "an operator stopped it",
-    "SHUTDOWN": "the player was shut down",
-}
-
-
-def played_test_words(why: str, found: float, limit: float) -> str:
-    """Write why a test returns to its start, with the value found and its limit."""
-    if not why.startswith("SILENT"):
-        return _ABORTS[why].format(found, limit)
-    time = f"for {found:.2g} s" if math.isfinite(found) else "so far"
-    return _ABORTS[why].format(time, limit)
-
-
 _SUPPORTS = {"POSITIVE": "somewhat", "STRONG": "strongly", "VERY_STRONG": "very strongly"}
 
 
@@ -610,12 +601,12 @@ _FORMATS: dict[str, Callable[[Any, str], str]] = {
     "rounded": lambda share, _: f"{100 * share:.{0 if share >= _SMALL_SHARE else 1}f} %",
     "percent": lambda share, _: percentage(share),
     "second": lambda time, _: utc_second(time),
+    "silent": lambda time, _: f"for {time:.2g} s" if math.isfinite(time) else "so far",
     "times": lambda change, _: _ratio(change, ".3g", " times"),
-    "two": lambda value, unit: two_digits(_SIZES.get(unit, 1.0) * value),
     "words": lambda name, _: name_in_words(name),
 }
-"""Formats of facts: ``{fact:name details}``. ``{fact:?this|that}`` chooses by a fact, and
-``{fact:+...}`` writes a fact only if it is known. Everything else is Python's own format."""
+"""Formats of facts: ``{fact:name details}``. ``{fact:?this|that}`` chooses by a fact. Everything
+else is Python's own format, of a fact that is known."""
 
 
 class _Writer(string.Formatter):

@@ -118,10 +118,7 @@ def _words(usage: Usage) -> str:
 def _print_usage_table(
     valves: Sequence[tuple[KeptValve, ValveUsage]], is_chosen: bool = False
 ) -> None:
-    """Print a table of days per valve, followed by sums and pace.
-
-    For chosen days the sum names the first and the last day.
-    """
+    """Print a table of days per valve, followed by sums and pace."""
     console = plain_console()
     for valve, usage in valves:
         counts = ("travel [m]", "reversals", "breakaways")
@@ -197,7 +194,7 @@ def _trend_as_json(trend: Trend | None) -> dict[str, Any] | None:
         "crossing": None
         if crossing is None
         else {
-            "limit": crossing.limit.value,
+            "limit": crossing.limit,
             "level_n": crossing.level,
             "expected": time_text(crossing.time),
             "earliest": time_text(crossing.earliest),
@@ -263,10 +260,7 @@ def _row(entry: HistoryEntry) -> dict[str, object]:
 
 
 def _write_csv(path: Path, rows: Sequence[Mapping[str, object]]) -> None:
-    """Write rows as a table, whose header has the columns of all rows; missing values are empty.
-
-    Raises OSError, which names `path`, if writing fails; then no part of the table is left.
-    """
+    """Write rows as a table, whose header has the columns of all rows; missing values are empty."""
     widest = max(rows, key=len)
     header = [*dict.fromkeys([*widest, *(name for row in rows for name in row)])]
     write_whole(path, csv_text(header, rows).encode())
@@ -341,7 +335,7 @@ def _trend_lines(trend: Trend | None) -> list[str]:
             for time in (trend.crossing.time, trend.crossing.earliest, trend.crossing.latest)
         )
         lines.append(
-            f"trend: {trend.crossing.limit.value} ({trend.crossing.level:.4g} N) expected on "
+            f"trend: {trend.crossing.limit} ({trend.crossing.level:.4g} N) expected on "
             f"{expected} (95 %: {earliest} to {latest})"
         )
     return lines

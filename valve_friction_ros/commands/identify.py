@@ -56,10 +56,7 @@ from valve_friction_ros.wording import in_zone
 
 
 def _baseline_from(options: argparse.Namespace) -> Baseline | None:
-    """Build the baseline from the parsed arguments.
-
-    Raises ValueError if it is impossible, or its interval is given without it.
-    """
+    """Build the baseline from the parsed arguments."""
     friction, width = options.baseline_coulomb_friction, options.baseline_half_width
     if options.baseline_recording is not None and (friction, width) != (None, None):
         raise ValueError("--baseline-recording provides the baseline: give no other baseline")
@@ -125,10 +122,7 @@ def _identified(
 def _of_healthy(
     options: argparse.Namespace, settings: MonitorSettings, reading: ReadingOptions
 ) -> tuple[Baseline, Recording]:
-    """Return the baseline of the healthy valve, and its record.
-
-    Raises RefusalError, which names the file, if the record cannot give a baseline.
-    """
+    """Return the baseline of the healthy valve, and its record."""
     whole = replace(reading, stretch=Stretch(), beside=())
     recorded = read_one(options.baseline_recording, settings.valve, whole)
     outcome = _identified(recorded, settings).outcome

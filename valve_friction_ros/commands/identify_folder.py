@@ -219,7 +219,7 @@ def forget_stale(
         if plan is None:
             continue
         if (entry.content, entry.settings) == (plan.content, plan.settings):
-            is_again = options.retry_failed and entry.failed
+            is_again = options.retry_failed and any(row["error"] for row in entry.rows)
             if not is_again and _is_whole(entry, plan, filed):
                 done.add(entry.recording)
         elif entry.content == plan.content and entry.settings != plan.settings:
@@ -410,10 +410,7 @@ def _planned(options: argparse.Namespace) -> dict[str, Plan]:
 def _identify(
     plans: Sequence[Plan], results: ResultsFile, share_out: ShareOut, stop: StopSignals
 ) -> list[Filing]:
-    """Identify the recordings, write their rows and show the progress; return what to file.
-
-    Each reason for refusals is shown once; the tally gives their number.
-    """
+    """Identify the recordings, write their rows and show the progress; return what to file."""
     filings: list[Filing] = []
     shown: set[str] = set()
     columns = (TextColumn("identifying"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())

@@ -46,11 +46,6 @@ class RecordingRows:
     rows: tuple[_Row, ...]
 
     @property
-    def failed(self) -> bool:
-        """True if any valve was refused."""
-        return any(row["error"] for row in self.rows)
-
-    @property
     def refused(self) -> bool:
         """True if all valves were refused."""
         return all(row["error"] for row in self.rows)

@@ -305,8 +305,8 @@ class AlarmFilter:
 
     Attributes
     ----------
-    since, until : int
-        Interval of time, ns since 1970 (UTC); `until` is excluded.
+    since : int
+        Earliest time, ns since 1970 (UTC).
     area : str
         Area of the valves, including its subareas; ``/`` for the whole plant.
     valve : str
@@ -320,7 +320,6 @@ class AlarmFilter:
     """
 
     since: int = -END_OF_TIME
-    until: int = END_OF_TIME
     area: str = "/"
     valve: str = ""
     states: frozenset[AlarmState] = frozenset()
@@ -331,7 +330,6 @@ class AlarmFilter:
         """Yield the conditions for the rows of events joined with their valves."""
         name = tables.valve.c.name
         yield _EVENT.c.time_ns >= self.since
-        yield _EVENT.c.time_ns < self.until
         if area := self.area.strip("/"):
             yield name.startswith(f"/{area}/", autoescape=True)
         if self.valve:

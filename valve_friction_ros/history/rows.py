@@ -485,11 +485,7 @@ def state_columns(diagnosis: Diagnosis) -> dict[str, Any]:
 def _diagnosis_in(
     row: RowMapping, ratio: Ratio | None, limits: FrictionLimits, is_below_zero: bool
 ) -> Diagnosis:
-    """Return the diagnosis in a row of any version.
-
-    `is_below_zero` says that a parameter of the record is negative. Raises ValueError for an
-    unknown state.
-    """
+    """Return the diagnosis in a row of any version."""
     level, signal = Level(row["level"]), StatusSignal(row["status_signal"])
     if row["state"] is None:
         return _of_former_version(

@@ -81,9 +81,9 @@ ISA_STEP_SIZES = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5)
 """Steps of the ISA test (section 5) as shares of the input range."""
 
 
-def pressure_at(share: float, pressure_range: tuple[float, float] = PRESSURE_RANGE) -> float:
-    """Pressure in Pa at `share` (0 to 1) of the input range, the bench's by default."""
-    lowest, highest = pressure_range
+def pressure_at(share: float) -> float:
+    """Pressure in Pa at `share` (0 to 1) of the input range of the bench."""
+    lowest, highest = PRESSURE_RANGE
     return lowest + share * (highest - lowest)
 
 
@@ -97,15 +97,7 @@ class Excitation(ABC):
 
 @dataclass(frozen=True)
 class _Wave(Excitation):
-    """A periodic signal between two pressures, beginning at the lower one.
-
-    Attributes
-    ----------
-    low, high : float
-        Lowest and highest pressure, Pa.
-    period : float
-        Duration of one period, s.
-    """
+    """A periodic signal between two pressures, beginning at the lower one."""
 
     low: float
     high: float

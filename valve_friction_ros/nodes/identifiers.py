@@ -88,15 +88,11 @@ def _places(valves: Sequence[str]) -> list[str]:
     return places
 
 
-def _identifiers_of_valves(
-    opened: contextlib.ExitStack, arguments: Sequence[str] | None = None
-) -> Iterator[Node]:
+def _identifiers_of_valves(opened: contextlib.ExitStack) -> Iterator[Node]:
     """Create the node `identifiers`, and an identifier for each valve in its parameter.
 
     An identifier that cannot start is logged and replaced by a `_FaultyValve`. Shared resources are
-    closed with `opened`. Raises ValueError if no valve is named, a valve is named twice, ROS
-    arguments remap a namespace, or no valve can start; InvalidNamespaceException if a name is not a
-    valid namespace.
+    closed with `opened`.
     """
     host = PolledNode("identifiers")
     yield host
@@ -110,7 +106,7 @@ def _identifiers_of_valves(
     for number, place in enumerate(places):
         if number and number % _TOGETHER == 0:
             context = Context()
-            join_graph(arguments, context)
+            join_graph(context)
         try:
             with bugs_reported(host, *WRONG_REQUESTS):
                 identifier = Identifier(
@@ -139,12 +135,12 @@ def _identifiers_of_valves(
         )
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
+def main() -> int:
     """Run the nodes."""
     if "FASTRTPS_DEFAULT_PROFILES_FILE" not in os.environ:  # Kilted still reads it
         os.environ.setdefault(PROFILES, str(_PROFILE))
     with contextlib.ExitStack() as opened:
-        return run_nodes(lambda: _identifiers_of_valves(opened, arguments), arguments)
+        return run_nodes(lambda: _identifiers_of_valves(opened))
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ import math
 import sys
 import time
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -192,9 +192,9 @@ class PressureSource(PacedNode):
         return pressure
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
+def main() -> int:
     """Run the node."""
-    return run_nodes(lambda: [PressureSource()], arguments)
+    return run_nodes(lambda: [PressureSource()])
 
 
 if __name__ == "__main__":

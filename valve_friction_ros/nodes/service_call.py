@@ -129,6 +129,8 @@ class TriggerCall:
     ----------
     answer : Trigger.Response or None
         The answer, once received.
+    future : Future or None
+        The future answer, once the service has been called.
     """
 
     def __init__(
@@ -149,12 +151,7 @@ class TriggerCall:
         self._begun = time.monotonic()
         self._client: Any = None
         self._greeting: PatientRequest | None = None
-        self._future: Any = None
-
-    @property
-    def is_made(self) -> bool:
-        """Whether the service has been called."""
-        return self._future is not None
+        self.future: Any = None
 
     def step(self) -> bool:
         """Continue the call; return whether it has been answered.
@@ -165,18 +162,18 @@ class TriggerCall:
             self._begin()
         waited = time.monotonic() - self._begun
         is_there = self._client.service_is_ready()
-        if self._future is None:
+        if self.future is None:
             if is_there and self._is_known(waited):
                 request = Trigger.Request()
                 if self._switch is not None:
                     request = SetBool.Request(data=self._switch)
-                self._future = self._client.call_async(request)
+                self.future = self._client.call_async(request)
             elif not is_there and waited > self._meeting:
                 raise UnansweredError(
                     f"{self._name} is not available: start the identifier of this valve"
                 )
-        elif self._future.done():
-            self.answer = self._future.result()
+        elif self.future.done():
+            self.answer = self.future.result()
             return True
         elif not is_there:
             raise UnansweredError(f"{self._identifier} ended before it answered")
@@ -305,7 +302,7 @@ class Caller:
         one = TriggerCall(self._node, identifier, service, patience, patience)
 
         def has_answered() -> bool:
-            if not one.is_made:
+            if one.future is None:
                 self._levels.clear()  # from before the call
             return one.step()
 

@@ -12,7 +12,7 @@
 import sys
 import time
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -149,9 +149,9 @@ class Simulator(PacedNode):
         self._publisher.publish(state)
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
+def main() -> int:
     """Run the node."""
-    return run_nodes(lambda: [Simulator()], arguments)
+    return run_nodes(lambda: [Simulator()])
 
 
 if __name__ == "__main__":

@@ -16,7 +16,7 @@ import math
 import sys
 import threading
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -31,8 +31,9 @@ from valve_friction_ros.nodes.plumbing.polled_subscription import PolledSubscrip
 from valve_friction_ros.nodes.plumbing.qos import LATCHED, stream
 from valve_friction_ros.nodes.plumbing.running import run_nodes
 from valve_friction_ros.nodes.pressure_source import pressure_from_file
-from valve_friction_ros.planning.played_test import Abort, PlayedTest, PlayLimits, PlayPhase
+from valve_friction_ros.planning.played_test import PlayedTest, PlayLimits, PlayPhase
 from valve_friction_ros.settings import NODES
+from valve_friction_ros.wording import Code, said
 
 _PARAMETERS = NODES["stroke_player"]
 _ACKNOWLEDGED = Duration(seconds=1.0)
@@ -86,7 +87,7 @@ class StrokePlayer(PacedNode):
         super().close()
         with self._lock:
             if self._test.phase is PlayPhase.PLAYING:
-                self._test.abort(Abort.SHUTDOWN)
+                self._test.abort(said(Code.PLAYER_SHUT_DOWN))
                 self._set(self._test.home)
                 self._publisher.wait_for_all_acked(_ACKNOWLEDGED)
                 self._tell()
@@ -100,7 +101,7 @@ class StrokePlayer(PacedNode):
 
     async def _stop(self) -> str:
         with self._lock:
-            self._test.abort(Abort.ASKED)
+            self._test.abort(said(Code.PLAYER_STOPPED))
         self.step()
         return str(self._test)
 
@@ -141,9 +142,9 @@ class StrokePlayer(PacedNode):
             self.get_logger().info(now[1])
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
+def main() -> int:
     """Run the node."""
-    return run_nodes(lambda: [StrokePlayer()], arguments)
+    return run_nodes(lambda: [StrokePlayer()])
 
 
 if __name__ == "__main__":

@@ -15,11 +15,10 @@ This module has no clock and no bus: its caller gives the time and the received 
 import math
 from dataclasses import dataclass
 from enum import Enum, auto
-from typing import NamedTuple
 
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.model.excitations import SampledPressure
-from valve_friction_ros.wording import played_test_words
+from valve_friction_ros.wording import Code, Statement, said
 
 
 class PlayPhase(Enum):
@@ -32,19 +31,6 @@ class PlayPhase(Enum):
     """Played to its end; the last set point stays."""
     BACK = auto()
     """Aborted; the initial pressure is set."""
-
-
-class Abort(Enum):
-    """Why a test returns to its initial pressure before its end."""
-
-    POSITION = auto()
-    PRESSURE = auto()
-    SILENT_STEM = auto()
-    SILENT_PRESSURE = auto()
-    HELD_UP = auto()
-    """The player itself stalled: set points would have jumped."""
-    ASKED = auto()
-    SHUTDOWN = auto()
 
 
 PRESSURE_MARGIN = 1e4
@@ -91,17 +77,6 @@ class PlayLimits:
                 raise ValueError(f"{name} must be above 0 s, got {getattr(self, name):g}")
 
 
-class _Doubt(NamedTuple):
-    """Why a test must not go on: the value found, and its limit."""
-
-    why: Abort
-    found: float
-    limit: float
-
-    def __str__(self) -> str:
-        return played_test_words(self.why.name, self.found, self.limit)
-
-
 class PlayedTest:
     """A stroke test that is played once per start, and returns to its initial pressure on an abort.
 
@@ -118,7 +93,7 @@ class PlayedTest:
     ----------
     phase : PlayPhase
         Phase of the test.
-    aborted : Abort or None
+    aborted : Statement or None
         Why it was aborted.
     """
 
@@ -127,15 +102,14 @@ class PlayedTest:
         self.phase, self.aborted = PlayPhase.WAITING, None
         self._begun = self._stepped = 0.0
         self._heard: dict[str, tuple[float, float]] = {}
-        self._found, self._limit = math.nan, math.nan
-        self._pending: _Doubt | None = None
+        self._pending: Statement | None = None
         if self.duration > limits.duration:
             raise ValueError(
                 f"the test takes {self.duration:g} s, but only {limits.duration:g} s are allowed: "
                 "plan a shorter test, or allow more time"
             )
 
-    aborted: Abort | None
+    aborted: Statement | None
 
     @property
     def duration(self) -> float:
@@ -160,22 +134,21 @@ class PlayedTest:
         if self.phase is PlayPhase.PLAYING and self._pending is None:
             self._pending = self._beyond(name)
 
-    def _beyond(self, name: str) -> _Doubt | None:
-        """Return the doubt if the last sample of a signal is beyond its limits, or nan."""
+    def _beyond(self, name: str) -> Statement | None:
+        """Say that the last sample of a signal is beyond its limits, or nan."""
         low, high = getattr(self.limits, name)
         value, _ = self._heard[name]
         if low <= value <= high:
             return None
-        return _Doubt(Abort[name.upper()], value, low if value < low else high)
+        code = Code[f"{name.upper()}_BEYOND_LIMIT"]
+        return said(code, found=value, limit=low if value < low else high)
 
-    def _doubt(self, now: float) -> _Doubt | None:
-        for name, silent in (
-            ("position", Abort.SILENT_STEM),
-            ("pressure", Abort.SILENT_PRESSURE),
-        ):
+    def _doubt(self, now: float) -> Statement | None:
+        """Say why the test must not go on; None if it may."""
+        for name, silent in (("position", Code.STEM_SILENT), ("pressure", Code.PRESSURE_SILENT)):
             _, at = self._heard.get(name, (math.nan, -math.inf))
             if not now - at <= self.limits.silence:
-                return _Doubt(silent, now - at, self.limits.silence)
+                return said(silent, found=now - at, limit=self.limits.silence)
             if (beyond := self._beyond(name)) is not None:
                 return beyond
         return None
@@ -193,7 +166,7 @@ class PlayedTest:
         self.phase, self.aborted, self._pending = PlayPhase.PLAYING, None, None
         self._begun = self._stepped = now
 
-    def abort(self, why: Abort) -> None:
+    def abort(self, why: Statement) -> None:
         """Return to the initial pressure at once, if the test is playing."""
         if self.phase is PlayPhase.PLAYING:
             self.phase, self.aborted = PlayPhase.BACK, why
@@ -206,11 +179,10 @@ class PlayedTest:
             late = now - self._stepped
             doubt = self._pending or self._doubt(now)
             if doubt is None and late > self.limits.silence:
-                doubt = _Doubt(Abort.HELD_UP, late, self.limits.silence)
+                doubt = said(Code.PLAYER_STALLED, found=late, limit=self.limits.silence)
             self._stepped = now
             if doubt is not None:
-                self.abort(doubt.why)
-                self._found, self._limit = doubt.found, doubt.limit
+                self.abort(doubt)
             elif now - self._begun >= self.duration:
                 self.phase = PlayPhase.ENDED
         if self.phase is PlayPhase.BACK:
@@ -219,11 +191,9 @@ class PlayedTest:
 
     def __str__(self) -> str:
         """Return the state of the test, on one line."""
-        if self.phase is PlayPhase.BACK and self.aborted is not None:
-            why = _Doubt(self.aborted, self._found, self._limit)
-            return f"returned to {self.home / 1e3:.4g} kPa: {why}"
         return {
             PlayPhase.WAITING: "waiting for start",
             PlayPhase.PLAYING: f"plays for {self.duration:.4g} s",
             PlayPhase.ENDED: "completed",
-        }.get(self.phase, "returned")
+            PlayPhase.BACK: f"returned to {self.home / 1e3:.4g} kPa: {self.aborted}",
+        }[self.phase]

@@ -340,11 +340,13 @@ def open_raw(path: Path, form: Columns) -> RawTable:
     """
     place = readable(path, form.maximum_megabytes)
     try:
-        is_text = _start(place) not in _READERS
+        start = _start(place)
     except OSError as error:
         raise ValueError(f"{path}: cannot be read as CSV: {cause_of(error)}") from None
-    with _explained(path, is_text):
-        if not is_text:
+    with _explained(path, is_text=start not in _READERS and start not in _UNREAD):
+        if start in _UNREAD:
+            raise ValueError(_UNREAD[start])
+        if start in _READERS:
             table = _looked_at(path, form, place)
         else:
             with io.BufferedReader(_Bounded(place, form.maximum_megabytes), _PIECE) as stream:
@@ -465,22 +467,16 @@ def _matlab(path: Path, form: Columns, places: Sequence[int] | None) -> Iterator
     yield frame if places is None else frame.iloc[:, list(places)]
 
 
-def _unread(what: str, *_: object) -> Iterator["pd.DataFrame"]:
-    raise ValueError(what)
-
-
 _READERS: Mapping[bytes, Callable[..., Iterator["pd.DataFrame"]]] = {
     _ZIP: _excel,
     b"PAR1": _parquet,
     b"MATL": _matlab,
-    **{
-        start: functools.partial(_unread, what)
-        for start, what in (
-            (b"\xd0\xcf\x11\xe0", "a workbook of Excel before 2007: save it as .xlsx or CSV"),
-            (b"\x89HDF", "an HDF5 file: save it as Parquet or CSV"),
-            (b"ARRO", "a Feather file: save it as Parquet or CSV"),
-            (b"TDSm", "a TDMS file of LabVIEW: export it as .lvm or CSV"),
-        )
-    },
 }
-"""Readers of files of cells, and what others are, by their first bytes."""
+"""Readers of files of cells, by their first bytes."""
+_UNREAD = {
+    b"\xd0\xcf\x11\xe0": "a workbook of Excel before 2007: save it as .xlsx or CSV",
+    b"\x89HDF": "an HDF5 file: save it as Parquet or CSV",
+    b"ARRO": "a Feather file: save it as Parquet or CSV",
+    b"TDSm": "a TDMS file of LabVIEW: export it as .lvm or CSV",
+}
+"""Files that cannot be read, by their first bytes."""

@@ -238,8 +238,7 @@ def _known(value: float) -> float | None:
     return None if math.isnan(value) else value
 
 
-@dataclass(frozen=True)
-class ResponseLimits:
+class ResponseLimits(NamedTuple):
     """Limits of the response in service; 0 for no limit.
 
     The plant must set them: the time allowed depends on the loop, and the dead time on the step.
@@ -255,11 +254,6 @@ class ResponseLimits:
     deviation: float = 0.0
     dead_time: float = 0.0
     t86: float = 0.0
-
-    def __post_init__(self) -> None:
-        """Refuse negative limits."""
-        if min(self.deviation, self.dead_time, self.t86) < 0:
-            raise ValueError("limits of the response must not be negative")
 
 
 @dataclass(frozen=True)

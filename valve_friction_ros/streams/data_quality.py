@@ -220,11 +220,6 @@ class DataFault:
     reading: float = field(default=math.nan, compare=False)
 
     @property
-    def is_of_clock(self) -> bool:
-        """Whether stamps differ from the clock of the node."""
-        return self.kind is FaultKind.CLOCK
-
-    @property
     def what(self) -> Statement:
         """What is wrong; unchanged while the fault lasts."""
         signal = None if self.signal is None else self.signal.value

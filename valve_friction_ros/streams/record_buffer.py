@@ -151,7 +151,7 @@ class RecordBuffer:
     An impossible sample, such as a pressure outside the sensor's range, is rejected and recorded
     with its cause. A stamp that goes back means that the clock has jumped, and clears the buffer.
     A stamp that goes back by at most 1.5 sampling periods was overtaken in transport; only that
-    sample is dropped.
+    sample is dropped. `taken` is the number of samples of both signals taken in total.
     """
 
     def __init__(self, valve: Valve, window: float) -> None:
@@ -177,7 +177,7 @@ class RecordBuffer:
         self._rejections: deque[Rejection] = deque(maxlen=_REJECTIONS_KEPT)
         self._first_stamp: int | None = None
         self._cleared_because: Statement | None = None
-        self._taken = 0
+        self.taken = 0
         self._rejected: Counter[Statement] = Counter()
 
     def __len__(self) -> int:
@@ -188,11 +188,6 @@ class RecordBuffer:
     def counts(self) -> tuple[int, int]:
         """Number of pressure samples and of position samples."""
         return len(self._pressure), len(self._position)
-
-    @property
-    def taken(self) -> int:
-        """Number of samples of both signals taken in total, including those before the window."""
-        return self._taken
 
     @property
     def rejected(self) -> Mapping[Statement, int]:
@@ -260,7 +255,7 @@ class RecordBuffer:
             return self._add_one_by_one(arrivals)
         self._pressure.extend(pressure)
         self._position.extend(position)
-        self._taken += arrivals.stamps.size
+        self.taken += arrivals.stamps.size
         if self._first_stamp is None and arrivals.stamps.size:
             self._first_stamp = int(arrivals.stamps[0])
         return Intake()
@@ -306,7 +301,7 @@ class RecordBuffer:
         if not lowest <= value <= highest:
             return self._reject(stamp, signal, SampleFault.OUT_OF_RANGE, span=span)
         buffer.append(stamp, value)
-        self._taken += 1
+        self.taken += 1
         self._first_stamp = stamp if self._first_stamp is None else self._first_stamp
         return None, None
 

@@ -127,7 +127,8 @@ class SampleBuffer:
 
     A sample takes 8 bytes if 1024 stamps are evenly spaced to the nanosecond. Otherwise it takes
     12 bytes, or 16 if the 1024 stamps span more than the 4.29 s that 32 bits of nanoseconds hold.
-    At most 1024 samples older than the window remain in memory.
+    At most 1024 samples older than the window remain in memory. `last_stamp` is the stamp of the
+    newest sample, ns, or None.
     """
 
     def __init__(self, window: float) -> None:
@@ -135,7 +136,7 @@ class SampleBuffer:
         self._open = Samples(np.empty(_CHUNK, np.int64), np.empty(_CHUNK, np.float64))
         self._filled = 0
         self._closed: deque[_Chunk] = deque()
-        self._last_stamp: int | None = None
+        self.last_stamp: int | None = None
 
     def __len__(self) -> int:
         """Count the samples of the last window."""
@@ -147,16 +148,11 @@ class SampleBuffer:
         opened = sum(part.nbytes for part in self._open)
         return opened + sum(chunk.nbytes for chunk in self._closed)
 
-    @property
-    def last_stamp(self) -> int | None:
-        """Stamp of the newest sample, ns, or None."""
-        return self._last_stamp
-
     def append(self, stamp: int, value: float) -> None:
         """Add a sample; its stamp (ns) must be later than the last one."""
         self._open.stamps[self._filled] = stamp
         self._open.values[self._filled] = value
-        self._last_stamp = stamp
+        self.last_stamp = stamp
         self._filled += 1
         if self._filled == _CHUNK:
             self._close()
@@ -171,7 +167,7 @@ class SampleBuffer:
             self._open.values[free] = samples.values[begin : begin + taken]
             begin += taken
             self._filled += taken
-            self._last_stamp = int(samples.stamps[begin - 1])
+            self.last_stamp = int(samples.stamps[begin - 1])
             if self._filled == _CHUNK:
                 self._close()
 
@@ -179,7 +175,7 @@ class SampleBuffer:
         """Forget all samples."""
         self._filled = 0
         self._closed.clear()
-        self._last_stamp = None
+        self.last_stamp = None
 
     def _close(self) -> None:
         """Compress the open chunk, and drop the chunks before the window."""
@@ -190,7 +186,7 @@ class SampleBuffer:
 
     def _begin(self) -> int:
         """Return the stamp at which the last window begins."""
-        return 0 if self._last_stamp is None else self._last_stamp - self._window
+        return 0 if self.last_stamp is None else self.last_stamp - self._window
 
     def _outside(self) -> int:
         """Count the samples still in memory that are older than the window."""
@@ -210,7 +206,7 @@ class SampleBuffer:
         found = np.zeros(stamps.size, np.bool_)
         if not stamps.size:
             return found
-        last = int(stamps[0]) if self._last_stamp is None else self._last_stamp
+        last = int(stamps[0]) if self.last_stamp is None else self.last_stamp
         if stamps[0] >= last and (stamps[1:] >= stamps[:-1]).all():
             return found
         steps = np.diff(np.concatenate((self._recent(), stamps)))

@@ -240,10 +240,7 @@ def _run(client: BenchClient, console: Console) -> tuple[Outcome, Outcome]:
 def _report(
     outcomes: Sequence[Outcome], level: int, message: str, output: Path, console: Console
 ) -> int:
-    """Print and plot the results, compare them with the tolerances; return the exit code.
-
-    `level` and `message` are those of the last diagnostic.
-    """
+    """Print and plot the results, compare them with the tolerances; return the exit code."""
     for outcome in outcomes:
         console.print(table_of(outcome))
     diagnosis = f"/diagnostics {Level(level).name}: {message}"

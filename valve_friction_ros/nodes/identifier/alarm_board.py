@@ -236,7 +236,7 @@ class AlarmBoard:
         time = self._node.get_clock().now().nanoseconds
         valve, days = self._history.valve, self._days
         step = _Step(lambda file: database.request_alarms(file, valve, kind, request, time, days))
-        await self._history.keep_step(step)
+        await self._history.keep_change(step)
         if step.refusal is not None:
             raise step.refusal
         if step.made is None:  # not stored, or not yet

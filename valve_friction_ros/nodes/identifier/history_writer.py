@@ -362,7 +362,8 @@ class HistoryWriter:
     async def keep_baseline(self, kept: KeptBaseline) -> None:
         """Store a baseline that is in force from now on, or its withdrawal."""
         self._former, self.baseline = self.baseline, None if kept.withdrawn else kept
-        await self.keep_change(lambda file: file.set_baseline(self.valve, kept))
+        with self._failures_remembered():
+            await self._written(lambda file: file.set_baseline(self.valve, kept))
 
     def keep_told_level(self, level: Level) -> None:
         """Queue the level reported last for storage."""
@@ -392,15 +393,7 @@ class HistoryWriter:
         return max(past or found, key=lambda one: one.time, default=None)
 
     async def keep_change(self, change: _Change) -> None:
-        """Make a change in the thread of the writer, and wait until it is written."""
-        with self._failures_remembered():
-            await self._written(change)
-
-    async def keep_step(self, change: _Change) -> None:
-        """Make a change like `keep_change`, but leave the trend as it is.
-
-        All alarms of a plant may be answered at once.
-        """
+        """Make a change that leaves the trend as it is, and wait until it is written."""
         if self._file is None:
             return
         self._waiting.add(change)

@@ -80,7 +80,7 @@ from valve_friction_ros.settings import (
     identification_from,
     survey_from,
 )
-from valve_friction_ros.streams import Arrivals, DataQuality, Intake, Signal
+from valve_friction_ros.streams import Arrivals, DataQuality, FaultKind, Intake, Signal
 from valve_friction_ros.wording import Code, Statement, said, sentence
 
 CHANGEABLE = tuple(one for one in NODES["identifier"] if not one.read_only)
@@ -458,7 +458,7 @@ class Identifier(ManagedNode):
         """
         now = time.monotonic()
         found = self._quality.faults(now)
-        if any(one.is_of_clock for one in found) and self._inputs.is_played():
+        if any(one.kind is FaultKind.CLOCK for one in found) and self._inputs.is_played():
             found = self._quality.faults(now, is_played=True)
         valve, joint = self._quality.valve, self._inputs.names.joint
         return {one.what: one.statement(valve, joint) for one in found}
@@ -560,10 +560,10 @@ class Identifier(ManagedNode):
         self._publish(status)
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
+def main() -> int:
     """Run the node."""
     with running_workers(_PROCESSES) as workers:
-        return run_nodes(lambda: [Identifier(workers)], arguments)
+        return run_nodes(lambda: [Identifier(workers)])
 
 
 if __name__ == "__main__":

@@ -158,10 +158,7 @@ def _started() -> _Child:
 
 
 def _done_by(child: _Child, work: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
-    """Return the result of a job in a child, or its exception and where it was raised.
-
-    Raises EOFError or OSError if the child dies.
-    """
+    """Return the result of a job in a child, or its exception and where it was raised."""
     assert child.stdin is not None and child.stdout is not None  # noqa: PT018, S101
     pickle.dump(_packed((work, arguments)), child.stdin)
     child.stdin.flush()

@@ -321,17 +321,16 @@ def _run(
         time.sleep(max(least, _LIVELY_PAUSE if now < lively_until else _PAUSE))
 
 
-def join_graph(arguments: Sequence[str] | None, context: Context | None = None) -> None:
+def join_graph(context: Context | None = None) -> None:
     """Create a participant of the ROS graph for the process or for a further context."""
-    rclpy.init(args=arguments, context=context, signal_handler_options=SignalHandlerOptions.NO)
+    rclpy.init(context=context, signal_handler_options=SignalHandlerOptions.NO)
 
 
-def run_nodes(create: Callable[[], Iterable[Node]], arguments: Sequence[str] | None = None) -> int:
+def run_nodes(create: Callable[[], Iterable[Node]]) -> int:
     """Run nodes in one process until Ctrl-C, SIGTERM or shutdown; return the exit code.
 
     The exit code is 0 after a clean stop. It is 2 if arguments or parameters prevent the start; the
-    cause is then written to stderr in one line. The ROS arguments are by default those of the
-    process.
+    cause is then written to stderr in one line. The ROS arguments are those of the process.
 
     If a worker is still busy at the end, the process ends here without waiting for it. If the loop
     or the middleware hangs permanently, the process ends with exit code 1.
@@ -339,7 +338,7 @@ def run_nodes(create: Callable[[], Iterable[Node]], arguments: Sequence[str] | N
     sys.setswitchinterval(_SWITCH)
     with StopRequest() as stop:
         try:
-            exit_code = _run_until(stop, create, arguments)
+            exit_code = _run_until(stop, create)
         except Exception:  # noqa: BLE001 - Python's own end would wait for the workers
             traceback.print_exc()
             exit_code = 1
@@ -352,14 +351,12 @@ def run_nodes(create: Callable[[], Iterable[Node]], arguments: Sequence[str] | N
     return exit_code
 
 
-def _run_until(
-    stop: StopRequest, create: Callable[[], Iterable[Node]], arguments: Sequence[str] | None
-) -> int:
+def _run_until(stop: StopRequest, create: Callable[[], Iterable[Node]]) -> int:
     nodes: list[Node] = []
     executors: dict[Context, TurnExecutor] = {}
     arm()
     try:
-        join_graph(arguments)
+        join_graph()
     except WRONG_REQUESTS as error:
         _disarm()
         return cannot_start(error)
