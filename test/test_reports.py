@@ -47,7 +47,7 @@ from valve_friction_ros.reports import (
     write_report,
 )
 from valve_friction_ros.reports.page import Verbatim, typeset
-from valve_friction_ros.usage import BINS, Usage, UsedDay, ValveUsage, limit_states
+from valve_friction_ros.usage import BINS, Usage, UsageLimits, UsedDay, ValveUsage, limit_states
 
 
 @pytest.fixture(scope="session")
@@ -250,7 +250,7 @@ def test_the_limits_of_a_packing(identified):
     def told(limits):
         return blocks(dataclasses.replace(identified, usage=usage, usage_limits=limits), "Use")
 
-    limits = {"travel_limit": 60.0, "reversal_limit": 1200.0}
+    limits = UsageLimits(travel=60.0, reversals=1200.0)
     _, table, warning, _, _ = told(limit_states(usage.since_renewal, usage.pace(), limits, 2 * day))
     assert table.rows == (
         ("travel_limit [m]", "3", "60", "5 %", "1970-02-10"),
@@ -258,9 +258,7 @@ def test_the_limits_of_a_packing(identified):
     )
     assert warning.text.startswith("Packing life: 200 of 1200 reversals (reversal_limit), expected")
     assert "replace the packing, then call ~/reset_usage" in warning.text
-    reached = limit_states(
-        usage.since_renewal, None, {"travel_limit": 3.0, "reversal_limit": 1e6}, 2 * day
-    )
+    reached = limit_states(usage.since_renewal, None, UsageLimits(3.0, 1e6), 2 * day)
     _, table, *_ = told(reached)
     assert [row[-1] for row in table.rows] == ["reached", "not known before a day of watching"]
     assert "has no limit: set the parameter travel_limit" in told(())[1].text

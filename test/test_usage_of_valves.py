@@ -25,6 +25,7 @@ from valve_friction_ros.usage import (
     Pace,
     Usage,
     UsageCounter,
+    UsageLimits,
     UsedDay,
     ValveUsage,
     limit_states,
@@ -325,7 +326,7 @@ class TestLimits:
         return found
 
     def test_expected_date(self):
-        state = self.state({"travel_limit": 150.0})
+        state = self.state(UsageLimits(travel=150.0))
         assert (state.used, state.limit, state.is_reached) == (100.0, 150.0, False)
         assert state.expected == NOW + 25 * DAY
         assert state.warns
@@ -335,7 +336,7 @@ class TestLimits:
         )
 
     def test_reached(self):
-        state = self.state({"reversal_limit": 10.0})
+        state = self.state(UsageLimits(reversals=10.0))
         assert state.is_reached
         assert state.warns
         assert state.expected is None
@@ -344,18 +345,18 @@ class TestLimits:
     @pytest.mark.parametrize("pace", [None, Pace(0.0, 0.0), Pace(1e-9, 0.0)])
     def test_no_date(self, pace):
         """Without a pace, or for one that reaches no date of the calendar."""
-        state = self.state({"travel_limit": 150.0}, pace=pace)
+        state = self.state(UsageLimits(travel=150.0), pace=pace)
         assert state.expected is None
         assert not state.warns
 
     def test_no_warning_a_month_before_but_what_has_warned_goes_on(self):
-        state = self.state({"travel_limit": 162.0})
+        state = self.state(UsageLimits(travel=162.0))
         assert state.expected == NOW + 31 * DAY
         assert not state.warns
         assert state._replace(has_warned=True).warns
 
     def test_what_has_warned_and_has_no_date_is_near_and_not_reached(self):
-        near = self.state({"travel_limit": 110.0}, pace=None)._replace(has_warned=True)
+        near = self.state(UsageLimits(travel=110.0), pace=None)._replace(has_warned=True)
         assert near.warns
         assert near.message == (
             "packing life: 100 m of 110 m travelled (travel_limit), close to its limit "
@@ -365,13 +366,18 @@ class TestLimits:
     def test_what_has_warned_is_found_again(self):
         """It warned at 3 m a day; then the valve rests."""
         used = [*days(20, distance=3.0), *days(28, first=TODAY, distance=0.0)]
-        limits = {"travel_limit": 100.0 + 2 * 60.0, "reversal_limit": 1e6}
+        limits = UsageLimits(travel=100.0 + 2 * 60.0, reversals=1e6)
         found = ValveUsage.of(used)
         (travel, _) = limit_states(found.since_renewal, found.pace(), limits, NOW)
         assert not travel.warns
         assert warned_limits(found, limits) == {"travel_limit"}
-        assert warned_limits(found, {"travel_limit": 1e4}) == set()
+        assert warned_limits(found, UsageLimits(travel=1e4)) == set()
         assert warned_limits(ValveUsage.of(used, renewal=7), limits) == set()
+
+    @pytest.mark.parametrize("name", ["travel", "reversals"])
+    def test_negative(self, name):
+        with pytest.raises(ValueError, match="limit must not be negative"):
+            UsageLimits(**{name: -1.0})
 
 
 def test_it_is_shown_as_plain_values():

@@ -11,13 +11,13 @@
 
 `UsageCounter` derives it from the stream of stem positions, with a dead band that noise and
 resolution of the sensor may raise. `ValveUsage` keeps it by day and since the packing was renewed.
-`limit_states` tells when the packing is due for replacement.
+`UsageLimits` define when the packing is due for replacement.
 """
 
 import itertools
 import math
 from collections import deque
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -558,8 +558,25 @@ _DATE_DOUBT = 2 * DAY
 """Time, ns, by which the expected date may recede until the end of the day of the warning."""
 
 
-LIMITS = ("travel_limit", "reversal_limit")
-"""Parameters with the limits of the usage since the packing was renewed."""
+@dataclass(frozen=True)
+class UsageLimits:
+    """Limits of the usage since the packing was renewed; 0: no limit.
+
+    Attributes
+    ----------
+    travel : float
+        Travelled distance, m.
+    reversals : float
+        Reversals.
+    """
+
+    travel: float = 0.0
+    reversals: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Refuse negative limits."""
+        require_non_negative("travel_limit", self.travel)
+        require_non_negative("reversal_limit", self.reversals)
 
 
 class LimitState(NamedTuple):
@@ -621,17 +638,15 @@ class LimitState(NamedTuple):
 
 
 def limit_states(
-    used: Usage, pace: Pace | None, limits: Mapping[str, float], now: int
+    used: Usage, pace: Pace | None, limits: UsageLimits, now: int
 ) -> tuple[LimitState, ...]:
-    """Compare the usage since the renewal with each given limit, at the time `now`, ns.
-
-    The `limits` are values of the parameters `LIMITS` by name: m, and reversals; 0: no limit.
-    """
+    """Compare the usage since the renewal with each given limit, at the time `now`, ns."""
     found = []
-    for name, value, daily in zip(
-        LIMITS, (used.distance, float(used.reversals)), pace or (None, None), strict=True
+    for name, value, limit, daily in (
+        ("travel_limit", used.distance, limits.travel, pace and pace.distance),
+        ("reversal_limit", float(used.reversals), limits.reversals, pace and pace.reversals),
     ):
-        if (limit := limits.get(name, 0.0)) > 0:
+        if limit > 0:
             days = (limit - value) / daily if daily else math.inf
             date = now + days * DAY
             expected = round(date) if value < limit and date < END_OF_TIME else None
@@ -639,7 +654,7 @@ def limit_states(
     return tuple(found)
 
 
-def warned_limits(usage: ValveUsage, limits: Mapping[str, float]) -> set[str]:
+def warned_limits(usage: ValveUsage, limits: UsageLimits) -> set[str]:
     """Return the names of the limits that have warned on a day of the present packing.
 
     Usage is known per whole day only, so limits due to warn within two days are included.

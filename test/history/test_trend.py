@@ -31,7 +31,7 @@ from valve_friction_ros.health import (
     SlidingFriction,
     identify_snapshot,
 )
-from valve_friction_ros.history import MONTH, entry_of, trend_of
+from valve_friction_ros.history import MONTH, Limit, entry_of, trend_of
 from valve_friction_ros.history.entry import settings_text
 from valve_friction_ros.history.trend import ScatteredLine, fit_line
 from valve_friction_ros.identification import IdentificationSettings, RefusalError, Verdict
@@ -160,18 +160,18 @@ class TestCrossing:
     def test_the_next_limit(self):
         """176.25 N = 1.25 · 141 N is 8.75 months after the beginning."""
         found = self.crossing(Baseline(141.0))
-        assert found.limit == "warn_ratio"
+        assert found.limit is Limit.WARN
         assert found.level == 176.25
         assert found.time == pytest.approx(NOON + 8.75 * MONTH, abs=1e-3 * DAY)
         assert found.earliest < found.time < found.latest
 
     def test_beyond_the_first_limit_the_second_is_next(self):
         found = self.crossing(Baseline(88.0))
-        assert (found.limit, found.level) == ("error_ratio", 176.0)
+        assert (found.limit, found.level) == (Limit.ERROR, 176.0)
 
     def test_falling(self):
         found = self.crossing(Baseline(200.0), drift=-3.0, limits=FrictionLimits(low_ratio=0.625))
-        assert (found.limit, found.level) == ("low_ratio", 125.0)
+        assert (found.limit, found.level) == (Limit.LOW, 125.0)
         assert found.time == pytest.approx(NOON + 25 / 3 * MONTH, abs=1e-3 * DAY)
 
     @pytest.mark.parametrize(
@@ -207,7 +207,7 @@ def test_against_a_baseline_of_sliding_friction_its_limits_count():
     rising = [DatedNumber(NOON + k * DAY, 220.0 + k, 1.0) for k in range(20)]
     trend = trend_of(rising, baseline)
     assert trend.what == "sliding friction at 9.5 mm/s"
-    assert trend.crossing.limit == "warn_ratio"
+    assert trend.crossing.limit is Limit.WARN
     assert trend.crossing.level == pytest.approx(250.0)
     assert trend.crossing.time == pytest.approx(NOON + 30 * DAY, rel=1e-6)
     assert trend_of(rising).what == "Coulomb friction"

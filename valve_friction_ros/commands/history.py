@@ -194,7 +194,7 @@ def _trend_as_json(trend: Trend | None) -> dict[str, Any] | None:
         "crossing": None
         if crossing is None
         else {
-            "limit": crossing.limit,
+            "limit": crossing.limit.value,
             "level_n": crossing.level,
             "expected": time_text(crossing.time),
             "earliest": time_text(crossing.earliest),
@@ -335,7 +335,7 @@ def _trend_lines(trend: Trend | None) -> list[str]:
             for time in (trend.crossing.time, trend.crossing.earliest, trend.crossing.latest)
         )
         lines.append(
-            f"trend: {trend.crossing.limit} ({trend.crossing.level:.4g} N) expected on "
+            f"trend: {trend.crossing.limit.value} ({trend.crossing.level:.4g} N) expected on "
             f"{expected} (95 %: {earliest} to {latest})"
         )
     return lines

@@ -14,13 +14,13 @@ import difflib
 import importlib
 import logging
 import os
+import re
 import signal
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 from valve_friction_ros import __version__
-from valve_friction_ros.commands.arguments import SUB_COMMANDS, python_name
 from valve_friction_ros.commands.process import (
     PROGRAM,
     ExitCode,
@@ -33,6 +33,24 @@ from valve_friction_ros.commands.process import (
 from valve_friction_ros.commands.start import end_at_once
 from valve_friction_ros.history.place import HistoryError
 from valve_friction_ros.identification.refusal import RefusalError
+
+SUB_COMMANDS = {
+    "identify": "identify the friction of a valve from a CSV file or a bag",
+    "inspect": "show what would be read of a table: columns, units, rates, gaps, quality",
+    "identify-folder": "identify all recordings of a folder, on all cores",
+    "describe-valve": "ask for an actuator's data and write its valve file",
+    "plan-test": "plan the stroke test that determines friction best, as a file to play",
+    "validate": "simulate a recording with an identified model",
+    "call": "have a running identifier identify, set its baseline, save, report or clear",
+    "history": "list, export and draw what the nodes have identified",
+    "history copy": "copy a history to another file, or to or from a server",
+    "dashboard": "serve plant, valves, alarms and comparison of a history, without ROS",
+    "dashboard-account": "make an account of the dashboard, with the hash of a password",
+    "reproduce-paper": "run the paper's programme and write a report",
+    "demo": "tighten the packing of a monitored simulated valve",
+}
+"""Line in ``--help`` of each sub-command. ``identify-folder`` is `run` of the module
+`identify_folder`: it takes the parsed options and returns the exit code."""
 
 
 def _chosen(arguments: Sequence[str]) -> tuple[str, list[str]]:
@@ -66,7 +84,7 @@ def _run(name: str, arguments: Sequence[str]) -> int:
     DECLARATIONS[name](parser)
     options = parser.parse_args(arguments, argparse.Namespace(command=name))
     package, _, _ = __name__.rpartition(".")
-    module = importlib.import_module(f"{package}.{python_name(name)}")
+    module = importlib.import_module(f"{package}.{re.sub('[- ]', '_', name)}")
     let_interrupt_raise()
     try:
         code: int = module.run(options)

@@ -84,6 +84,7 @@ if TYPE_CHECKING:
         LIMIT_NAMES as LIMIT_NAMES,
         MONTH as MONTH,
         Crossing as Crossing,
+        Limit as Limit,
         Trend as Trend,
         ValveHistory as ValveHistory,
         drift_text as drift_text,

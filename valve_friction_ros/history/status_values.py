@@ -111,7 +111,7 @@ def trend_values(trend: Trend | None) -> dict[str, str]:
         "friction_drift of": trend.what,
     }
     if trend.crossing is not None:
-        values["limit_expected"] = trend.crossing.limit
+        values["limit_expected"] = trend.crossing.limit.value
         values["limit_expected [date]"] = utc_day(trend.crossing.time)
         values["limit_expected earliest [date]"] = utc_day(trend.crossing.earliest)
         values["limit_expected latest [date]"] = utc_day(trend.crossing.latest)

@@ -12,6 +12,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from enum import Enum
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -188,15 +189,23 @@ def fit_line(
     )
 
 
+class Limit(Enum):
+    """A limit of the friction, by the name of its ratio."""
+
+    WARN = "warn_ratio"
+    ERROR = "error_ratio"
+    LOW = "low_ratio"
+
+
 @dataclass(frozen=True)
 class Crossing:
     """Expected crossing of the next limit.
 
-    `limit` names its ratio, and `level` is the friction there, N; `earliest` and `latest` are the
-    ends of the 95 % interval of the expected time, ns since 1970 (UTC).
+    `level` is the friction at the limit, N; `earliest` and `latest` are the ends of the 95 %
+    interval of the expected time, ns since 1970 (UTC).
     """
 
-    limit: str
+    limit: Limit
     level: float
     time: int
     earliest: int
@@ -297,11 +306,11 @@ def _crossing(
     half_width = (baseline.sliding or baseline).half_width
     span = end - begin
     now = line.at(span)
-    rising = (("warn_ratio", limits.warn_ratio), ("error_ratio", limits.error_ratio))
+    rising = ((Limit.WARN, limits.warn_ratio), (Limit.ERROR, limits.error_ratio))
     ahead = (
         [one for one in rising if one[1] * friction > now]
         if line.slope > 0
-        else [("low_ratio", limits.low_ratio)]
+        else [(Limit.LOW, limits.low_ratio)]
     )
     if not ahead:
         return None
@@ -349,7 +358,7 @@ def drift_text(trend: Trend) -> str:
     if trend.crossing is None:
         return text
     when = utc(trend.crossing.time)
-    return f"{text}; {LIMIT_NAMES[trend.crossing.limit]} expected {when:%Y-%m-%d}"
+    return f"{text}; {LIMIT_NAMES[trend.crossing.limit.value]} expected {when:%Y-%m-%d}"
 
 
 def end_of_trend(trend: Trend) -> int:

@@ -15,7 +15,7 @@ import struct
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, field
 from functools import partial
@@ -421,11 +421,11 @@ class _Turning(Companion):
         self._executor.shutdown(0.1)
 
 
-def main() -> int:
+def main(arguments: Sequence[str] | None = None) -> int:
     """Run the node and its web server until Ctrl-C or SIGTERM; return the exit code."""
     keep_little_memory()
     try:
-        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+        rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
         node = Dashboard()
     except (*WRONG_REQUESTS, OSError) as error:
         rclpy.try_shutdown()

@@ -88,11 +88,15 @@ def _places(valves: Sequence[str]) -> list[str]:
     return places
 
 
-def _identifiers_of_valves(opened: contextlib.ExitStack) -> Iterator[Node]:
+def _identifiers_of_valves(
+    opened: contextlib.ExitStack, arguments: Sequence[str] | None = None
+) -> Iterator[Node]:
     """Create the node `identifiers`, and an identifier for each valve in its parameter.
 
     An identifier that cannot start is logged and replaced by a `_FaultyValve`. Shared resources are
-    closed with `opened`.
+    closed with `opened`. Raises ValueError if no valve is named, a valve is named twice, ROS
+    arguments remap a namespace, or no valve can start; InvalidNamespaceException if a name is not a
+    valid namespace.
     """
     host = PolledNode("identifiers")
     yield host
@@ -106,7 +110,7 @@ def _identifiers_of_valves(opened: contextlib.ExitStack) -> Iterator[Node]:
     for number, place in enumerate(places):
         if number and number % _TOGETHER == 0:
             context = Context()
-            join_graph(context)
+            join_graph(arguments, context)
         try:
             with bugs_reported(host, *WRONG_REQUESTS):
                 identifier = Identifier(
@@ -135,12 +139,12 @@ def _identifiers_of_valves(opened: contextlib.ExitStack) -> Iterator[Node]:
         )
 
 
-def main() -> int:
+def main(arguments: Sequence[str] | None = None) -> int:
     """Run the nodes."""
     if "FASTRTPS_DEFAULT_PROFILES_FILE" not in os.environ:  # Kilted still reads it
         os.environ.setdefault(PROFILES, str(_PROFILE))
     with contextlib.ExitStack() as opened:
-        return run_nodes(lambda: _identifiers_of_valves(opened))
+        return run_nodes(lambda: _identifiers_of_valves(opened, arguments), arguments)
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ import math
 import sys
 import time
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -192,9 +192,9 @@ class PressureSource(PacedNode):
         return pressure
 
 
-def main() -> int:
+def main(arguments: Sequence[str] | None = None) -> int:
     """Run the node."""
-    return run_nodes(lambda: [PressureSource()])
+    return run_nodes(lambda: [PressureSource()], arguments)
 
 
 if __name__ == "__main__":

@@ -12,7 +12,7 @@
 import sys
 import time
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -149,9 +149,9 @@ class Simulator(PacedNode):
         self._publisher.publish(state)
 
 
-def main() -> int:
+def main(arguments: Sequence[str] | None = None) -> int:
     """Run the node."""
-    return run_nodes(lambda: [Simulator()])
+    return run_nodes(lambda: [Simulator()], arguments)
 
 
 if __name__ == "__main__":

@@ -16,7 +16,7 @@ import math
 import sys
 import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -142,9 +142,9 @@ class StrokePlayer(PacedNode):
             self.get_logger().info(now[1])
 
 
-def main() -> int:
+def main(arguments: Sequence[str] | None = None) -> int:
     """Run the node."""
-    return run_nodes(lambda: [StrokePlayer()])
+    return run_nodes(lambda: [StrokePlayer()], arguments)
 
 
 if __name__ == "__main__":

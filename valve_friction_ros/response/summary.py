@@ -238,7 +238,8 @@ def _known(value: float) -> float | None:
     return None if math.isnan(value) else value
 
 
-class ResponseLimits(NamedTuple):
+@dataclass(frozen=True)
+class ResponseLimits:
     """Limits of the response in service; 0 for no limit.
 
     The plant must set them: the time allowed depends on the loop, and the dead time on the step.
@@ -254,6 +255,11 @@ class ResponseLimits(NamedTuple):
     deviation: float = 0.0
     dead_time: float = 0.0
     t86: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Refuse negative limits."""
+        if min(self.deviation, self.dead_time, self.t86) < 0:
+            raise ValueError("limits of the response must not be negative")
 
 
 @dataclass(frozen=True)

@@ -16,31 +16,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-SUB_COMMANDS = {
-    "identify": "identify the friction of a valve from a CSV file or a bag",
-    "inspect": "show what would be read of a table: columns, units, rates, gaps, quality",
-    "identify-folder": "identify all recordings of a folder, on all cores",
-    "describe-valve": "ask for an actuator's data and write its valve file",
-    "plan-test": "plan the stroke test that determines friction best, as a file to play",
-    "validate": "simulate a recording with an identified model",
-    "call": "have a running identifier identify, set its baseline, save, report or clear",
-    "history": "list, export and draw what the nodes have identified",
-    "history copy": "copy a history to another file, or to or from a server",
-    "dashboard": "serve plant, valves, alarms and comparison of a history, without ROS",
-    "dashboard-account": "make an account of the dashboard, with the hash of a password",
-    "reproduce-paper": "run the paper's programme and write a report",
-    "demo": "tighten the packing of a monitored simulated valve",
-}
-"""Line in ``--help`` of each sub-command. The arguments of ``identify-folder`` are declared by
-`_identify_folder` in `declared`; `run` in the module `identify_folder` takes the parsed options and
-returns the exit code."""
-
-
-def python_name(command: str) -> str:
-    """Return the name of a sub-command in Python."""
-    return re.sub("[- ]", "_", command)
-
-
 _OPTION = re.compile(r"^ *(--[a-z-]+)(?: (\S+)|): ", re.MULTILINE)
 
 

@@ -20,7 +20,7 @@ from datetime import datetime, timedelta, timezone
 from pathlib import Path
 from types import MappingProxyType
 
-from valve_friction_ros.commands.arguments import SUB_COMMANDS, add_options, percent, python_name
+from valve_friction_ros.commands.arguments import add_options, percent
 from valve_friction_ros.commands.arguments.identification import (
     PLACE,
     add_fail_on,
@@ -458,6 +458,20 @@ def _demo(parser: argparse.ArgumentParser) -> None:
 
 
 DECLARATIONS: Mapping[str, Callable[[argparse.ArgumentParser], None]] = MappingProxyType(
-    {name: globals()[f"_{python_name(name)}"] for name in SUB_COMMANDS}
+    {
+        "identify": _identify,
+        "inspect": _inspect,
+        "identify-folder": _identify_folder,
+        "describe-valve": _describe_valve,
+        "plan-test": _plan_test,
+        "validate": _validate,
+        "call": _call,
+        "history": _history,
+        "history copy": _history_copy,
+        "dashboard": _dashboard,
+        "dashboard-account": _dashboard_account,
+        "reproduce-paper": _reproduce_paper,
+        "demo": _demo,
+    }
 )
 """Functions that declare the arguments, by sub-command."""

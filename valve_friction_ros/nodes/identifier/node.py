@@ -560,10 +560,10 @@ class Identifier(ManagedNode):
         self._publish(status)
 
 
-def main() -> int:
+def main(arguments: Sequence[str] | None = None) -> int:
     """Run the node."""
     with running_workers(_PROCESSES) as workers:
-        return run_nodes(lambda: [Identifier(workers)])
+        return run_nodes(lambda: [Identifier(workers)], arguments)
 
 
 if __name__ == "__main__":

@@ -25,11 +25,11 @@ from valve_friction_ros.history.status_values import number_text
 from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
 from valve_friction_ros.streams import Arrivals, Kind, utc_day
 from valve_friction_ros.usage import (
-    LIMITS,
     LimitState,
     Pace,
     Usage,
     UsageCounter,
+    UsageLimits,
     UsedDay,
     ValveUsage,
     limit_states,
@@ -191,8 +191,11 @@ class UsageWatch:
         return tuple(states)
 
     @property
-    def _limits(self) -> dict[str, float]:
-        return {name: self._node.get_parameter(name).value for name in LIMITS}
+    def _limits(self) -> UsageLimits:
+        return UsageLimits(
+            self._node.get_parameter("travel_limit").value,
+            self._node.get_parameter("reversal_limit").value,
+        )
 
     def _remember_warnings(self) -> None:
         """Find the limits that have warned in earlier runs."""

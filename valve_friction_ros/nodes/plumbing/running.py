@@ -321,16 +321,17 @@ def _run(
         time.sleep(max(least, _LIVELY_PAUSE if now < lively_until else _PAUSE))
 
 
-def join_graph(context: Context | None = None) -> None:
+def join_graph(arguments: Sequence[str] | None, context: Context | None = None) -> None:
     """Create a participant of the ROS graph for the process or for a further context."""
-    rclpy.init(context=context, signal_handler_options=SignalHandlerOptions.NO)
+    rclpy.init(args=arguments, context=context, signal_handler_options=SignalHandlerOptions.NO)
 
 
-def run_nodes(create: Callable[[], Iterable[Node]]) -> int:
+def run_nodes(create: Callable[[], Iterable[Node]], arguments: Sequence[str] | None = None) -> int:
     """Run nodes in one process until Ctrl-C, SIGTERM or shutdown; return the exit code.
 
     The exit code is 0 after a clean stop. It is 2 if arguments or parameters prevent the start; the
-    cause is then written to stderr in one line. The ROS arguments are those of the process.
+    cause is then written to stderr in one line. The ROS arguments are by default those of the
+    process.
 
     If a worker is still busy at the end, the process ends here without waiting for it. If the loop
     or the middleware hangs permanently, the process ends with exit code 1.
@@ -338,7 +339,7 @@ def run_nodes(create: Callable[[], Iterable[Node]]) -> int:
     sys.setswitchinterval(_SWITCH)
     with StopRequest() as stop:
         try:
-            exit_code = _run_until(stop, create)
+            exit_code = _run_until(stop, create, arguments)
         except Exception:  # noqa: BLE001 - Python's own end would wait for the workers
             traceback.print_exc()
             exit_code = 1
@@ -351,12 +352,14 @@ def run_nodes(create: Callable[[], Iterable[Node]]) -> int:
     return exit_code
 
 
-def _run_until(stop: StopRequest, create: Callable[[], Iterable[Node]]) -> int:
+def _run_until(
+    stop: StopRequest, create: Callable[[], Iterable[Node]], arguments: Sequence[str] | None
+) -> int:
     nodes: list[Node] = []
     executors: dict[Context, TurnExecutor] = {}
     arm()
     try:
-        join_graph()
+        join_graph(arguments)
     except WRONG_REQUESTS as error:
         _disarm()
         return cannot_start(error)
