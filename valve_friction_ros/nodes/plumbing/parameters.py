@@ -60,9 +60,11 @@ def declare_parameters(node: Node, settings: Iterable[Setting]) -> None:
     """Declare `settings` on `node`; raises rclpy's parameter exceptions for a bad override.
 
     A number may later be set as text, because ``ros2 param load`` sends ``.nan`` and ``1e-06`` as
-    text. Raises ValueError for an override with a name that no node of this package declares, if it
-    was given by ``-p`` or resembles a declared name. Other unknown overrides, as in a file shared
-    with other packages, are logged.
+    text. A number that ``ros2 param delete`` has unset stays declared.
+
+    Raises ValueError for an override with a name that no node of this package declares, if it was
+    given by ``-p`` or resembles a declared name. Other unknown overrides, as in a file shared with
+    other packages, are logged.
     """
     declared = tuple(settings)
     _require_known(node, {one.name for one in declared})
@@ -82,6 +84,13 @@ def declare_parameters(node: Node, settings: Iterable[Setting]) -> None:
         return [_read(change) if change.name in numbers else change for change in changes]
 
     node.add_pre_set_parameters_callback(read_numbers)
+    unset = {one.name: one for one in declared if one.default is None}
+
+    def stay_declared(changes: list[Parameter]) -> None:
+        for name in [one.name for one in changes if not node.has_parameter(one.name)]:
+            node.declare_parameter(name, None, _descriptor(unset[name]), ignore_override=True)
+
+    node.add_post_set_parameters_callback(stay_declared)
 
 
 def _wrong_type(settings: Iterable[Setting], changes: Iterable[Parameter]) -> str:
@@ -141,7 +150,7 @@ def values_of(
     node: Node, settings: Iterable[Setting], changes: Iterable[Parameter] = ()
 ) -> dict[str, Any]:
     """Return the values of the parameters by name after `changes`; None if unset."""
-    values = {one.name: node.get_parameter(one.name).value for one in settings}
+    values = {one.name: node.get_parameter_or(one.name).value for one in settings}
     for parameter in changes:
         if parameter.name in values:
             values[parameter.name] = parameter.value
