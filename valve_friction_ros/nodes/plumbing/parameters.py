@@ -12,6 +12,7 @@
 import contextlib
 import functools
 import itertools
+import math
 import sys
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from typing import Any
@@ -68,6 +69,8 @@ def declare_parameters(node: Node, settings: Iterable[Setting]) -> None:
     """
     declared = tuple(settings)
     _require_known(node, {one.name for one in declared})
+    if wrong := _wrong_type(declared, parameter_overrides(node).values()):
+        raise ValueError(wrong)
 
     def check(changes: list[Parameter]) -> SetParametersResult:
         reason = _wrong_type(declared, changes)
@@ -94,14 +97,25 @@ def declare_parameters(node: Node, settings: Iterable[Setting]) -> None:
 
 
 def _wrong_type(settings: Iterable[Setting], changes: Iterable[Parameter]) -> str:
-    """Return the problem with a parameter that may be unset and is not a number, or ''.
+    """Return the problem with a parameter of wrong type, and the remedy, or ''.
 
-    rclpy does not check the type of these.
+    rclpy checks no type where a parameter may be unset, and names no remedy.
     """
-    unset = {one.name for one in settings if one.default is None}
-    for one in changes:
-        if one.name in unset and one.type_ not in (Parameter.Type.NOT_SET, Parameter.Type.DOUBLE):
-            return f"{one.name}: expected 'Type.DOUBLE' got 'Type.{one.type_.name}'"
+    known = {one.name: one for one in settings}
+    for change in changes:
+        if change.name not in known or change.type_ == Parameter.Type.NOT_SET:
+            continue
+        default, value = known[change.name].default, change.value
+        wanted = Parameter("", value=math.nan if default is None else default).type_
+        if change.type_ == wanted or isinstance(default, list | tuple):
+            continue
+        is_whole = change.type_ == Parameter.Type.INTEGER
+        remedy = {
+            Parameter.Type.BOOL: "write true or false",
+            Parameter.Type.DOUBLE: f"write {value}.0" if is_whole else "write a number",
+            Parameter.Type.INTEGER: "write a whole number",
+        }.get(wanted, f"put it in quotes, '{value}'")
+        return f"{change.name}: expected '{wanted}' got '{change.type_}': {remedy}"
     return ""
 
 
