@@ -289,12 +289,15 @@ class TestOverlap:
         assert record.duration == pytest.approx(0.058, rel=4 * EPS)
 
     @pytest.mark.parametrize("later", [100, 5000])
-    def test_none(self, later):
-        stem = signal(every(1, 101, later), position)
+    @pytest.mark.parametrize("is_stem", [True, False])
+    def test_none(self, later, is_stem):
+        early, late = every(1, 101), every(1, 101, later)
+        stem = signal(late if is_stem else early, position)
         with pytest.raises(RefusalError) as refusal:
-            uniform_recording(signal(every(1, 101), pressure), stem)
+            uniform_recording(signal(early if is_stem else late, pressure), stem)
+        name = "stem_state" if is_stem else "actuator_pressure"
         assert str(refusal.value) == (
-            "actuator_pressure and stem_state do not overlap in time (stem_state begins "
+            f"actuator_pressure and stem_state do not overlap in time ({name} begins "
             f"{later / 1e3:.3g} s later): check that their clocks agree and that both are recorded"
         )
 

@@ -478,8 +478,8 @@ def uniform_recording(
     if inside.size < 2:
         apart = (position.stamps[0] - drive.stamps[0]) / 1e9
         raise RefusalError(
-            f"{names[0]} and {names[1]} do not overlap in time ({names[1]} begins {apart:.3g} s "
-            "later): check that their clocks agree and that both are recorded"
+            f"{names[0]} and {names[1]} do not overlap in time ({names[int(apart > 0)]} begins "
+            f"{abs(apart):.3g} s later): check that their clocks agree and that both are recorded"
         )
     origin = inside[0]
     grid = np.arange(0, inside[-1] - origin + 1, period, dtype=np.float64)
