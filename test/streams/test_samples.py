@@ -302,6 +302,22 @@ class TestOverlap:
         )
 
 
+def test_stamps_of_the_arrival_are_told_from_an_outage():
+    """As of a gateway that stamps its blocks when they come, each 200 ms with 20 samples."""
+    blocks = np.arange(50)[:, np.newaxis] * 200 * MILLISECOND
+    stamps = START + (blocks + np.arange(20) * 50_000).ravel()
+    samples = Samples(stamps, np.random.default_rng(1).standard_normal(1000))
+    with pytest.raises(RefusalError) as refusal:
+        uniform_recording(samples, samples)
+    assert str(refusal.value) == (
+        "the time stamps of actuator_pressure come in 50 bunches, 0.199 s apart: stamp each sample "
+        "with the time of its measurement, not of its arrival"
+    )
+    outages = stamps + np.repeat(np.arange(50) ** 3, 20) * MILLISECOND
+    with pytest.raises(RefusalError, match=r"^gap of 7\.\d+ s in actuator_pressure"):
+        uniform_recording(samples._replace(stamps=outages), samples._replace(stamps=outages))
+
+
 class TestUnevenStamps:
     @given(
         pauses=st.lists(st.integers(500_000, 1_500_000), min_size=20, max_size=100),
