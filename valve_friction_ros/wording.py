@@ -81,6 +81,7 @@ class Code(Enum):
     NOTHING_IDENTIFIED = "nothing has been identified yet"
     REFUSED = "the latest identification was refused: {reason}; previous result: {of}"
     REFUSED_REPEATEDLY = "the latest {count} identifications were refused: {reason}"
+    REFUSED_IN_A_ROW = "the latest {count} identifications were refused"
     MEASURED_EARLIER = "{of} (measured {time:minute}; not seen in any record since)"
     # Parts
     FRICTION = "{of:words}"

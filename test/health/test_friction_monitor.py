@@ -100,6 +100,17 @@ class TestRefusalsInARow:
         told = "the latest 3 identifications were refused: why"
         assert str(self.problem(self.BAD, self.BAD, self.BAD)) == told
 
+    def test_the_diagnosis_beside_them_has_the_reason(self):
+        monitor = FrictionMonitor(SETTINGS)
+        for _ in range(3):
+            monitor.refuse(self.BAD)
+        assert str(monitor.refusals_beside_diagnosis) == "the latest 3 identifications were refused"
+        assert str(monitor.diagnosis().message) == "no estimate: why"
+        monitor.skip(RefusedRecordError("other", {}, is_fault=True))
+        assert str(monitor.refusals_beside_diagnosis).endswith(
+            "4 identifications were refused: other"
+        )
+
     def test_too_little_motion_does_not_count(self):
         assert self.problem(*[self.STILL] * 9) is None
         assert self.problem(self.BAD, self.STILL, self.BAD) is None

@@ -23,7 +23,7 @@ import rclpy
 from extension.node_graph import graph_as_markdown, graph_of
 from lifecycle_msgs.msg import State, Transition
 from lifecycle_msgs.srv import ChangeState, GetState
-from live_nodes import NAMESPACE, NODE, PROJECT, values_of
+from live_nodes import NAMESPACE, NODE, OK, PROJECT, values_of
 from local_server import free_port
 from rcl_interfaces.srv import GetParameters
 from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
@@ -31,10 +31,13 @@ from rclpy.experimental import EventsExecutor
 from rclpy.parameter import Parameter
 from records import quick_record
 from std_msgs.msg import Empty
+from std_srvs.srv import Trigger
 from type_description_interfaces.srv import GetTypeDescription
 
+from valve_friction_ros.health import identify_with_numbers
 from valve_friction_ros.model import BENCH_VALVE
 from valve_friction_ros.nodes import Dashboard, PressureSource, Simulator, StrokePlayer
+from valve_friction_ros.nodes.identifier import workers
 from valve_friction_ros.nodes.identifier.node import Identifier
 from valve_friction_ros.nodes.plumbing import polled_node, polled_subscription, rclpy_private
 from valve_friction_ros.nodes.plumbing.polled_node import PacedNode, TurnExecutor
@@ -242,6 +245,37 @@ def test_a_transition_that_the_state_does_not_have_is_refused(live, compose, kin
         assert change(client, Transition.TRANSITION_CONFIGURE)
         assert not change(client, Transition.TRANSITION_CONFIGURE)
         assert state(client) == State.PRIMARY_STATE_INACTIVE
+    assert not node.failures
+
+
+@pytest.mark.parametrize("kind", [TurnExecutor, SingleThreadedExecutor])
+def test_a_clean_up_ends_an_identification(live, compose, monkeypatch, kind):
+    """What followed met topics and a service that were gone, and ended the executor of a user."""
+    begun, cleaned = threading.Event(), threading.Event()
+
+    def slow(*arguments):
+        begun.set()
+        cleaned.wait(60)
+        return identify_with_numbers(*arguments)
+
+    monkeypatch.setattr(workers, "identify_with_numbers", slow)
+    client, node = live.client, compose(lifecycle=True)
+    with spun(node, kind(context=compose.context)):
+        assert change(client, Transition.TRANSITION_CONFIGURE)
+        assert change(client, Transition.TRANSITION_ACTIVATE)
+        client.connect()
+        client.fill(quick_record())
+        client.request(Trigger, f"{NODE}/identify", Trigger.Request())
+        client.wait_until(begun.is_set, "an identification")
+        assert change(client, Transition.TRANSITION_DEACTIVATE)
+        assert change(client, Transition.TRANSITION_CLEANUP)
+        cleaned.set()
+        for _ in range(2):
+            client.drain()
+            assert state(client) == State.PRIMARY_STATE_UNCONFIGURED
+        assert change(client, Transition.TRANSITION_CONFIGURE)
+        assert change(client, Transition.TRANSITION_ACTIVATE)
+        assert client.next_status().level == OK
     assert not node.failures
 
 

@@ -10,6 +10,7 @@
 """Inputs of an identifier: missing and mismatched ones are warned of; samples by the block."""
 
 import contextlib
+import itertools
 
 import numpy as np
 import pytest
@@ -90,6 +91,26 @@ def sends_until_taken(client, made):
         return STEM not in client.statuses[-1][1].message
 
     client.wait_until(is_taken, "samples of the stem")
+
+
+def test_two_publishers_at_once(client):
+    """Their samples are mixed, and if their stamps rise nothing else shows it."""
+    told = f"2 publishers send {STEM} at once, of {client.node.get_fully_qualified_name()}: end"
+    with publisher(client, JointState, STEM) as one, publisher(client, JointState, STEM) as other:
+        turns = itertools.cycle((one, other))
+
+        def is_told():
+            next(turns).publish(JointState())
+            return told in client.statuses[-1][1].message
+
+        client.wait_until(is_told, told)
+        assert client.statuses[-1][1].level == WARN
+
+        def is_over():
+            one.publish(JointState())
+            return told not in client.statuses[-1][1].message
+
+        client.wait_until(is_over, "its end")
 
 
 @pytest.mark.slow

@@ -220,6 +220,16 @@ def test_numbers_may_be_texts(client, text):
     assert math.isnan(fixed)
 
 
+def test_a_deleted_number_is_unset_and_can_be_set_again(client):
+    """As ros2 param delete does: rclpy no longer has the parameter."""
+    for value in (2.0, None, 3.0, None):
+        assert client.set_together(NODE, {"fixed.mass": value}).successful
+        assert client.parameters(NODE, "fixed.mass") == [value]
+    assert client.set_together(NODE, {"warn_ratio": 1.25}).successful
+    client.identified(quick_record())
+    assert not client.last_values()["fixed"]
+
+
 def test_simulated_time(live):
     """Without a clock it is missed; a clock that is set back empties the buffer."""
     client = live.client_of_identifier()

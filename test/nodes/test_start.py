@@ -34,6 +34,13 @@ REFUSED = {  # node, parameters, words of the only line
         "identifier has no parameter 'diaphragm_aera': did you mean 'diaphragm_area'?",
     ),
     "unknown": ("identifier", {"gain": 1.0}, "identifier has no parameter 'gain': known are "),
+    "whole number": (
+        "identifier",
+        {"window": 60},
+        "window: expected 'Type.DOUBLE' got 'Type.INTEGER': write 60.0",
+    ),
+    "gauge": ("identifier", {"pressure_reference": 0}, "'Type.INTEGER': write 0.0"),
+    "number as a tag": ("identifier", {"valve_tag": 101}, "put it in quotes, '101'"),
     "no home": (
         "identifier",
         {"history_file": "'~nobody-such/x'"},
@@ -275,6 +282,21 @@ def python(code, *arguments, **environment):
     )
     assert done.stderr == ""
     return done.stdout
+
+
+@pytest.mark.parametrize("given", ["-p", "fv_101", "--params-file"])
+def test_arguments_that_ros_does_not_read_are_refused(given):
+    """Without --ros-args a parameter was ignored, and the valve watched with its default."""
+    code = (
+        "import sys; from valve_friction_ros.nodes import start; sys.argv[1:] = sys.argv[-2:]; "
+        "assert start.identifier() == 2"
+    )
+    told = f"cannot start: '{given}' is no argument of ROS: write --ros-args before "
+    done = subprocess.run(
+        [sys.executable, "-c", code, given, "travel:=0.03"],
+        cwd=PROJECT, capture_output=True, text=True, timeout=100, check=True,
+    )  # fmt: skip
+    assert done.stderr.startswith(told)
 
 
 HELP = """

@@ -291,6 +291,38 @@ def test_a_publisher_that_begins_anew():
     assert counted([900, 901], [1, 2], [3, 5]).lost == 1
 
 
+def senders(*publishers, until=6.0, period=0.1):
+    """How many send at once at the end; each has a begin, an end, s, and its first number."""
+    counter = LossCounter()
+    for look in range(round(until / period) + 1):
+        now = look * period
+        for begin, end, first in publishers:
+            if begin <= now < end:
+                counter.take([first + look - round(begin / period)], now)
+    return counter.senders(until)
+
+
+def test_publishers_that_send_at_once_are_counted():
+    assert senders((0.0, 9.0, 500)) == 1
+    assert senders((0.0, 9.0, 500), (1.0, 9.0, 1)) == 2
+    assert senders((0.0, 9.0, 1), (0.0, 9.0, 1)) == 2
+    assert senders((0.0, 9.0, 1), (0.0, 9.0, 1), (1.0, 9.0, 1)) == 3
+    assert senders((0.0, 9.0, 500), (1.0, 9.0, 1), until=9.9, period=3.3) == 2
+
+
+@pytest.mark.parametrize("pause", [0.0, 0.5, 7.0])
+@pytest.mark.parametrize("lasts", [0.5, 3.0, 9.0])
+def test_a_restarted_publisher_is_no_second_one(pause, lasts):
+    """Also when it comes to the numbers that it had before."""
+    for until in np.arange(lasts + pause, 2 * lasts + pause + 6.0, 0.5):
+        assert senders((0.0, lasts, 1), (lasts + pause, 99.0, 1), until=until) <= 1
+
+
+def test_one_that_has_ended_is_no_longer_counted():
+    assert senders((0.0, 9.0, 500), (0.0, 20.0, 1), until=13.9) == 2
+    assert senders((0.0, 9.0, 500), (0.0, 20.0, 1), until=14.2) == 1
+
+
 def test_the_share_is_of_the_last_minute():
     counter = LossCounter()
     counter.take(range(100), 0.0)

@@ -289,14 +289,33 @@ class TestOverlap:
         assert record.duration == pytest.approx(0.058, rel=4 * EPS)
 
     @pytest.mark.parametrize("later", [100, 5000])
-    def test_none(self, later):
-        stem = signal(every(1, 101, later), position)
+    @pytest.mark.parametrize("is_stem", [True, False])
+    def test_none(self, later, is_stem):
+        early, late = every(1, 101), every(1, 101, later)
+        stem = signal(late if is_stem else early, position)
         with pytest.raises(RefusalError) as refusal:
-            uniform_recording(signal(every(1, 101), pressure), stem)
+            uniform_recording(signal(early if is_stem else late, pressure), stem)
+        name = "stem_state" if is_stem else "actuator_pressure"
         assert str(refusal.value) == (
-            "actuator_pressure and stem_state do not overlap in time (stem_state begins "
+            f"actuator_pressure and stem_state do not overlap in time ({name} begins "
             f"{later / 1e3:.3g} s later): check that their clocks agree and that both are recorded"
         )
+
+
+def test_stamps_of_the_arrival_are_told_from_an_outage():
+    """As of a gateway that stamps its blocks when they come, each 200 ms with 20 samples."""
+    blocks = np.arange(50)[:, np.newaxis] * 200 * MILLISECOND
+    stamps = START + (blocks + np.arange(20) * 50_000).ravel()
+    samples = Samples(stamps, np.random.default_rng(1).standard_normal(1000))
+    with pytest.raises(RefusalError) as refusal:
+        uniform_recording(samples, samples)
+    assert str(refusal.value) == (
+        "the time stamps of actuator_pressure come in 50 bunches, 0.199 s apart: stamp each sample "
+        "with the time of its measurement, not of its arrival"
+    )
+    outages = stamps + np.repeat(np.arange(50) ** 3, 20) * MILLISECOND
+    with pytest.raises(RefusalError, match=r"^gap of 7\.\d+ s in actuator_pressure"):
+        uniform_recording(samples._replace(stamps=outages), samples._replace(stamps=outages))
 
 
 class TestUnevenStamps:

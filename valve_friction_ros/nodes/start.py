@@ -9,6 +9,7 @@
 
 """Entry points of the nodes, which can be interrupted even before a node is imported."""
 
+import contextlib
 import importlib
 import os
 import signal
@@ -31,11 +32,27 @@ def _start(node: str) -> int:
         signal.signal(signal.SIGPIPE, signal.SIG_DFL)
         print(_help_text(node.split(".", maxsplit=1)[0], str(module.__doc__)))  # noqa: T201
         return 0
+    if rest := _not_of_ros():
+        print(  # noqa: T201
+            f"cannot start: {rest[0]!r} is no argument of ROS: write --ros-args before all -r, -p "
+            "and --params-file; see --help",
+            file=sys.stderr,
+        )
+        return 2
     exit_code: int = module.main()
     # Everything is closed: Python would need another second to tear down its modules.
     sys.stdout.flush()
     sys.stderr.flush()
     os._exit(exit_code)
+
+
+def _not_of_ros() -> list[str]:
+    """Return the arguments that ROS does not read; none if it will refuse the others."""
+    from rclpy.utilities import remove_ros_args  # noqa: PLC0415 - slow to import
+
+    with contextlib.suppress(RuntimeError):
+        return [*remove_ros_args(sys.argv)[1:]]
+    return []
 
 
 def _help_text(name: str, purpose: str) -> str:

@@ -12,8 +12,8 @@
 `DataQuality` sees each arrival, whether it was accepted, and the clocks. It judges by arrivals
 alone: a sensor that reports rarely and a stem at rest are no faults. The stamps of both signals may
 differ by as much as a signal advances from one look to the next, so a recording may be played at
-any speed. `LossCounter` counts messages that never arrived, by the sequence numbers of their
-publishers.
+any speed. `LossCounter` counts messages that never arrived, and the publishers that send at once,
+by the sequence numbers of the publishers.
 """
 
 import math
@@ -38,6 +38,10 @@ _MOST_A_SECOND = 1e6
 """Messages per second of one publisher. A jump of the numbers beyond it means another publisher."""
 _MOST_PUBLISHERS = 16
 """Most publishers that are tracked per stream; beyond it the longest silent is forgotten."""
+_SENDS = 5.0
+"""Time, s, for which a silent publisher still counts among those that send."""
+_SIDE_BY_SIDE = 2.0
+"""Time, s, for which publishers send at once before they count: a restart is no second one."""
 
 
 class Losses(NamedTuple):
@@ -67,10 +71,11 @@ class Losses(NamedTuple):
 
 @dataclass
 class _Publisher:
-    """The next number expected from a publisher, and when its last message was seen, s."""
+    """The next number expected from a publisher, and its first and last message, s."""
 
     expected: int
     seen: float
+    since: float
 
 
 class LossCounter:
@@ -126,15 +131,25 @@ class LossCounter:
     def _followed(self, first: int, last: int, now: float) -> int:
         """Take consecutive numbers; return how many are missing before the first."""
         known = [one for one in self._publishers if one.expected <= first]
-        one = max(known, key=lambda one: one.expected, default=None)
+        one = max(known, key=lambda one: (one.expected, one.seen), default=None)
         # Messages that arrive within one look were sent since the previous look.
         if one is None or first - one.expected > _MOST_A_SECOND * max(now - one.seen, 1e-3):
             if len(self._publishers) >= _MOST_PUBLISHERS:
                 self._publishers.remove(min(self._publishers, key=lambda one: one.seen))
-            self._publishers.append(_Publisher(last + 1, now))
+            self._publishers.append(_Publisher(last + 1, now, now))
             return 0
+        if now - one.seen > _SENDS:
+            one.since = now
         missing, one.expected, one.seen = first - one.expected, last + 1, now
         return missing
+
+    def senders(self, now: float) -> int:
+        """Return how many publishers have been sending at once for a while, at `now`, s."""
+        live = [one for one in self._publishers if now - one.seen <= _SENDS]
+        if len(live) < 2:
+            return len(live)
+        both = min(one.seen for one in live) - max(one.since for one in live)
+        return len(live) if both >= _SIDE_BY_SIDE else 1
 
     def forget(self) -> None:
         """Forget the publishers but keep the counts: each publisher starts anew."""

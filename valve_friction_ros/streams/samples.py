@@ -334,6 +334,9 @@ _LARGEST_GAP = 10
 
 Chosen: at 100 Hz or faster such a pause is 0.1 s at most, short against a stroke."""
 
+_FEWEST_BUNCHES = 10
+"""Least gaps of about one length between stamps in bunches. Chosen: outages differ in length."""
+
 _MOST_MISSING = 0.5
 """Share of a signal's time in gaps above which no record is built.
 
@@ -363,8 +366,9 @@ Chosen: at 1 kHz that is 1 µs, in which a stem at 0.1 m/s moves by 0.1 µm, bel
 class Gap:
     """The longest gap of signal `name`: `seconds` before `sample`, `since_start` s after the first.
 
-    All gaps together take the `share` of the time of the signal. The text of a gap is a refusal
-    with its remedy.
+    All gaps together take the `share` of the time of the signal. `bunches` is the number of bunches
+    that the samples come in, with gaps of about one length between them; else 0. The text of a gap
+    is a refusal with its remedy.
     """
 
     name: str
@@ -372,6 +376,7 @@ class Gap:
     seconds: float
     since_start: float
     share: float
+    bunches: int = 0
 
     @property
     def what(self) -> str:
@@ -383,6 +388,12 @@ class Gap:
 
     def __str__(self) -> str:
         """Return the refusal."""
+        if self.bunches and self.share > _MOST_MISSING:
+            return (
+                f"the time stamps of {self.name} come in {self.bunches} bunches, "
+                f"{self.seconds:.3g} s apart: stamp each sample with the time of its measurement, "
+                "not of its arrival"
+            )
         return f"{self.what}: use a record without a gap, or clear the buffer and record again"
 
 
@@ -410,8 +421,16 @@ def _gap(name: str, samples: Samples, period: int) -> Gap | None:
         return None
     since_start = float(samples.stamps[longest] - samples.stamps[0]) / 1e9
     whole = float(samples.stamps[-1] - samples.stamps[0])
-    share = float(np.sum(pauses[pauses > _LARGEST_GAP * period])) / whole
-    return Gap(name, longest + 1, float(pauses[longest]) / 1e9, since_start, share)
+    gaps = pauses[pauses > _LARGEST_GAP * period]
+    is_regular = gaps.size >= _FEWEST_BUNCHES and 2 * np.median(gaps) > gaps.max()
+    return Gap(
+        name,
+        longest + 1,
+        float(gaps.max()) / 1e9,
+        since_start,
+        float(np.sum(gaps)) / whole,
+        gaps.size + 1 if is_regular else 0,
+    )
 
 
 def _period(name: str, samples: Samples) -> int:
@@ -474,8 +493,8 @@ def uniform_recording(
     if inside.size < 2:
         apart = (position.stamps[0] - drive.stamps[0]) / 1e9
         raise RefusalError(
-            f"{names[0]} and {names[1]} do not overlap in time ({names[1]} begins {apart:.3g} s "
-            "later): check that their clocks agree and that both are recorded"
+            f"{names[0]} and {names[1]} do not overlap in time ({names[int(apart > 0)]} begins "
+            f"{abs(apart):.3g} s later): check that their clocks agree and that both are recorded"
         )
     origin = inside[0]
     grid = np.arange(0, inside[-1] - origin + 1, period, dtype=np.float64)

@@ -75,7 +75,7 @@ class FaultLog:
         for what in [one for one, seen in self._seen.items() if now - seen >= _CALM]:
             again = self._repeated.pop(what, 0)
             lasted = self._seen.pop(what) - self._begun.pop(what)
-            times = f", {again} times more" if again else ""
+            times = f", seen {again + 1} times" if again else ""
             self._log.info(f"ended after {lasted:.0f} s{times}: {what}")
 
     def note(self, what: Statement, statement: Statement, now: float) -> None:

@@ -505,6 +505,7 @@ class Identifier(ManagedNode):
         faults = self._faults()
         unusable = [*self._silence(), *map(sentence, faults.values())]
         of_data = [*unusable, *map(str, filter(None, [self._monitor.refusals_problem]))]
+        refusals = map(str, filter(None, [self._monitor.refusals_beside_diagnosis]))
         self._board.follow(
             {kind: found[watch] for kind, watch in self._watch_of.items()},
             of_data,
@@ -528,7 +529,7 @@ class Identifier(ManagedNode):
             estimate,
             self._monitor,
             now.nanoseconds,
-            [*filter(None, [self.overdue()]), *self._evidence.problems, *of_data],
+            [*filter(None, [self.overdue()]), *self._evidence.problems, *unusable, *refusals],
             upkeep,
             {
                 **{key: value for one in self._watches for key, value in one.values().items()},

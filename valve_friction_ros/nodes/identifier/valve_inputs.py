@@ -67,6 +67,17 @@ class _Input(PolledSubscription):
             "on ~/samples"
         )
 
+    def senders_problem(self) -> str | None:
+        """Describe publishers that send at once, else return None: their samples are mixed."""
+        if (count := self.senders) < 2:
+            return None
+        found = self._node.get_publishers_info_by_topic(self.topic)
+        nodes = {f"{one.node_namespace.rstrip('/')}/{one.node_name}" for one in found}
+        return (
+            f"{count} publishers send {self.topic} at once, of {' and '.join(sorted(nodes))}: "
+            "end all but one, or give the others topics of their own"
+        )
+
     def follow(self) -> None:
         if self.silence() > _SILENCE and self.follow_publishers():
             quality = self.quality.reliability.name.lower()
@@ -187,7 +198,9 @@ class ValveInputs:
         """
         found = [] if self._bad_block is None else [self._bad_block]
         problems = [one.problem(timeout) for one in self._used()]
-        problems += [one.loss_problem() for one in (self._pressure, self._stem, self._blocks)]
+        inputs = (self._pressure, self._stem, self._blocks)
+        problems += [one.senders_problem() for one in inputs]
+        problems += [one.loss_problem() for one in inputs]
         return found + [problem for problem in problems if problem is not None]
 
     def _used(self) -> tuple[_Input, ...]:

@@ -14,12 +14,14 @@ States and services are those of ROS 2 (``ros2 lifecycle``) in rclpy's own imple
 
 import contextlib
 import inspect
-from collections.abc import Callable
+import types
+from collections.abc import Callable, Coroutine, Generator
 from typing import Any
 
 from lifecycle_msgs.msg import Transition
 from rclpy.exceptions import ParameterException
 from rclpy.lifecycle import LifecycleNodeMixin, LifecycleState, TransitionCallbackReturn
+from rclpy.service import Service
 from rclpy.timer import Timer
 
 from valve_friction_ros.nodes.plumbing.polled_node import PolledNode
@@ -47,6 +49,7 @@ class ManagedNode(LifecycleNodeMixin, PolledNode):
     def __init__(self, *arguments: Any, **named: Any) -> None:
         self.is_active = self.is_configured = False
         self.opened = contextlib.ExitStack()
+        self._era = object()
         PolledNode.__init__(self, *arguments, **named)
 
     def begin(self) -> None:
@@ -116,8 +119,9 @@ class ManagedNode(LifecycleNodeMixin, PolledNode):
         ]
 
     def close(self) -> None:
-        """Close all resources; the end of a node in any state."""
+        """Close all resources; the end of a node in any state, and of what its callbacks await."""
         self.is_active = self.is_configured = False
+        self._era = object()
         self.opened.close()
 
     def _dissolve(self) -> None:
@@ -126,6 +130,31 @@ class ManagedNode(LifecycleNodeMixin, PolledNode):
         for one, destroy in self._entities():
             if id(one) not in self._before and one is not self._poll_timer:
                 destroy(one)
+
+    def create_service(
+        self, kind: Any, name: str, callback: Callable[..., Any], **named: Any
+    ) -> Service:
+        """Create a service whose answers end with the configuration that they began in."""
+        if not inspect.iscoroutinefunction(callback):
+            return super().create_service(kind, name, callback, **named)
+
+        async def answered(request: Any, response: Any) -> Any:
+            return await self._while_configured(callback(request, response)) or response
+
+        return super().create_service(kind, name, answered, **named)
+
+    @types.coroutine
+    def _while_configured(self, work: Coroutine[Any, Any, Any]) -> Generator[Any, Any, Any]:
+        """Run a coroutine to its end, or to the next time that it would go on after a `close`."""
+        era, told = self._era, None
+        while era is self._era:
+            try:
+                awaited = work.send(told)
+            except StopIteration as end:
+                return end.value
+            told = yield awaited
+        work.close()
+        return None
 
     def create_timer(
         self, timer_period_sec: float, callback: Callable[..., Any], *arguments: Any, **named: Any
@@ -140,7 +169,7 @@ class ManagedNode(LifecycleNodeMixin, PolledNode):
 
             async def awaited() -> None:
                 if self.is_active:
-                    await callback()
+                    await self._while_configured(callback())
 
             return awaited
 

@@ -12,6 +12,7 @@
 import contextlib
 import functools
 import itertools
+import math
 import sys
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from typing import Any
@@ -60,12 +61,16 @@ def declare_parameters(node: Node, settings: Iterable[Setting]) -> None:
     """Declare `settings` on `node`; raises rclpy's parameter exceptions for a bad override.
 
     A number may later be set as text, because ``ros2 param load`` sends ``.nan`` and ``1e-06`` as
-    text. Raises ValueError for an override with a name that no node of this package declares, if it
-    was given by ``-p`` or resembles a declared name. Other unknown overrides, as in a file shared
-    with other packages, are logged.
+    text. A number that ``ros2 param delete`` has unset stays declared.
+
+    Raises ValueError for an override with a name that no node of this package declares, if it was
+    given by ``-p`` or resembles a declared name. Other unknown overrides, as in a file shared with
+    other packages, are logged.
     """
     declared = tuple(settings)
     _require_known(node, {one.name for one in declared})
+    if wrong := _wrong_type(declared, parameter_overrides(node).values()):
+        raise ValueError(wrong)
 
     def check(changes: list[Parameter]) -> SetParametersResult:
         reason = _wrong_type(declared, changes)
@@ -82,17 +87,35 @@ def declare_parameters(node: Node, settings: Iterable[Setting]) -> None:
         return [_read(change) if change.name in numbers else change for change in changes]
 
     node.add_pre_set_parameters_callback(read_numbers)
+    unset = {one.name: one for one in declared if one.default is None}
+
+    def stay_declared(changes: list[Parameter]) -> None:
+        for name in [one.name for one in changes if not node.has_parameter(one.name)]:
+            node.declare_parameter(name, None, _descriptor(unset[name]), ignore_override=True)
+
+    node.add_post_set_parameters_callback(stay_declared)
 
 
 def _wrong_type(settings: Iterable[Setting], changes: Iterable[Parameter]) -> str:
-    """Return the problem with a parameter that may be unset and is not a number, or ''.
+    """Return the problem with a parameter of wrong type, and the remedy, or ''.
 
-    rclpy does not check the type of these.
+    rclpy checks no type where a parameter may be unset, and names no remedy.
     """
-    unset = {one.name for one in settings if one.default is None}
-    for one in changes:
-        if one.name in unset and one.type_ not in (Parameter.Type.NOT_SET, Parameter.Type.DOUBLE):
-            return f"{one.name}: expected 'Type.DOUBLE' got 'Type.{one.type_.name}'"
+    known = {one.name: one for one in settings}
+    for change in changes:
+        if change.name not in known or change.type_ == Parameter.Type.NOT_SET:
+            continue
+        default, value = known[change.name].default, change.value
+        wanted = Parameter("", value=math.nan if default is None else default).type_
+        if change.type_ == wanted or isinstance(default, list | tuple):
+            continue
+        is_whole = change.type_ == Parameter.Type.INTEGER
+        remedy = {
+            Parameter.Type.BOOL: "write true or false",
+            Parameter.Type.DOUBLE: f"write {value}.0" if is_whole else "write a number",
+            Parameter.Type.INTEGER: "write a whole number",
+        }.get(wanted, f"put it in quotes, '{value}'")
+        return f"{change.name}: expected '{wanted}' got '{change.type_}': {remedy}"
     return ""
 
 
@@ -141,7 +164,7 @@ def values_of(
     node: Node, settings: Iterable[Setting], changes: Iterable[Parameter] = ()
 ) -> dict[str, Any]:
     """Return the values of the parameters by name after `changes`; None if unset."""
-    values = {one.name: node.get_parameter(one.name).value for one in settings}
+    values = {one.name: node.get_parameter_or(one.name).value for one in settings}
     for parameter in changes:
         if parameter.name in values:
             values[parameter.name] = parameter.value

@@ -199,9 +199,20 @@ class PolledNode(Node):
     def create_service(
         self, kind: Any, name: str, callback: Callable[..., Any], **named: Any
     ) -> Service:
-        """Create a service as rclpy does; a `TurnExecutor` polls its requests."""
+        """Create a service as rclpy does; a `TurnExecutor` polls its requests.
+
+        An answer that comes after the service was destroyed is dropped.
+        """
         named["callback_group"] = self._services_in_turns
-        return super().create_service(kind, name, self.exclusive(callback), **named)
+        service = super().create_service(kind, name, self.exclusive(callback), **named)
+        send = service.send_response
+
+        def send_response(response: Any, header: Any) -> None:
+            with contextlib.suppress(InvalidHandle):
+                send(response, header)
+
+        service.send_response = send_response  # rclpy would end its executor
+        return service
 
     def create_timer(
         self, timer_period_sec: float, callback: Callable[..., Any], *arguments: Any, **named: Any

@@ -229,6 +229,11 @@ class PolledSubscription(InputWatch):
         return taken
 
     @property
+    def senders(self) -> int:
+        """Number of publishers that have been sending at once for a while, 0 if unknown."""
+        return self._counter.senders(time.monotonic())
+
+    @property
     def losses(self) -> Losses:
         """Messages that were published but not taken."""
         return self._counter.losses(time.monotonic())
