@@ -68,6 +68,13 @@ def method_named(name: str) -> Method:
     return METHODS[current]
 
 
+def _require(name: str, given: object, kind: type, remedy: str) -> None:
+    if not isinstance(given, kind):
+        raise TypeError(
+            f"{name} must be of type {kind.__name__}, got {type(given).__name__}: give {remedy}"
+        )
+
+
 def identify(
     recording: Recording,
     valve: Valve,
@@ -101,6 +108,8 @@ def identify(
         If the record does not determine the friction; the message names cause and remedy.
     ValueError
         If no method has this name.
+    TypeError
+        If an argument has another type, such as a frame in place of a recording.
 
     Examples
     --------
@@ -117,8 +126,12 @@ def identify(
     >>> low < 150.0 < high
     True
     """
+    _require("recording", recording, Recording, "what vf.read_recording returns")
+    _require("valve", valve, Valve, "vf.Valve(...), or the valve of vf.read_valve_file(...)")
     if isinstance(settings, str):
         return method_named(settings)(recording, valve)
+    if settings is not None:
+        _require("settings", settings, IdentificationSettings, "vf.IdentificationSettings(...)")
     return method_named(method)(recording, valve, settings)
 
 
