@@ -228,12 +228,12 @@ class _Reader:
     ) -> NDArray[np.bool_]:
         """Return which rows have a value of a signal; an empty entry is not a value."""
         if cells.dtype.kind in "fiu":
-            there = cells.notna().to_numpy()
+            there = cells.notna()
         else:
-            there = (cells.fillna("").astype(str).str.strip() != "").to_numpy()
+            there = cells.fillna("").astype(str).str.strip() != ""
         if self.layout.tag_place is not None:
-            there &= (block[self.layout.tag_place].str.strip() == signal.name).to_numpy()
-        return np.asarray(there, np.bool_)
+            there = there & (block[self.layout.tag_place].str.strip() == signal.name)
+        return np.array(there, np.bool_)  # a copy: the array of pandas 3 is read-only
 
     def _count(
         self,
