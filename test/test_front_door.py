@@ -208,6 +208,17 @@ def test_arguments_of_other_types_are_named(columns, loose_record, benches):
     ]:
         with pytest.raises(TypeError, match=told):
             vf.identify(*given)
+    result = vf.identify(loose_record, valve, "published")
+    with pytest.raises(TypeError, match=r"^baseline must be of type Baseline or Result, got float"):
+        vf.compare(result, 150.0)
+    with pytest.raises(TypeError, match=r"^parameters must be of type KarnoppParameters or Result"):
+        vf.simulate(valve, valve, loose_record.pressure, 0.01)
+
+
+def test_a_ratio_without_an_interval_says_so(loose_record, benches):
+    published = vf.identify(loose_record, benches["low"].valve, "published")
+    told = vf.compare(published, vf.Baseline(published.values["coulomb_friction"] / 1.5)).message
+    assert told.startswith("friction has grown: Coulomb friction is 1.50 (no interval) times its")
 
 
 def test_an_unknown_method_is_named(loose_record, benches):

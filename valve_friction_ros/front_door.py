@@ -21,7 +21,7 @@ from valve_friction_ros.health.baseline import Baseline
 from valve_friction_ros.health.diagnosis import Diagnosis, FrictionLimits
 from valve_friction_ros.health.valve_diagnosis import diagnose_valve
 from valve_friction_ros.identification.result import Result
-from valve_friction_ros.model.checks import require_row
+from valve_friction_ros.model.checks import A_VALVE, require_row, require_type
 from valve_friction_ros.model.drive import Drive
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.simulation import StemState, Trajectory
@@ -194,6 +194,14 @@ def simulate(
     >>> round(1e3 * float(stem.position[-1]), 1)
     20.9
     """
+    require_type("valve", valve, A_VALVE, Valve)
+    require_type(
+        "parameters",
+        parameters,
+        "a result, or vf.KarnoppParameters(...)",
+        KarnoppParameters,
+        Result,
+    )
     if isinstance(parameters, Result):
         parameters = parameters.simulated_model()
     return simulated(valve, parameters, drive, sample_period, start)
@@ -238,5 +246,7 @@ def compare(
     >>> diagnosis.level.name, round(diagnosis.ratio.value, 1)
     ('ERROR', 2.7)
     """
+    require_type("result", result, "what vf.identify returns", Result)
+    require_type("baseline", baseline, "a result, or vf.Baseline(friction in N)", Baseline, Result)
     healthy = Baseline.of(baseline) if isinstance(baseline, Result) else baseline
     return diagnose_valve(result, healthy, limits).friction

@@ -33,6 +33,7 @@ from valve_friction_ros.model import (
     compile_kernels,
     simulate,
 )
+from valve_friction_ros.model.checks import A_VALVE, require_type
 from valve_friction_ros.model.valve import Valve
 
 
@@ -66,13 +67,6 @@ def method_named(name: str) -> Method:
     if current not in METHODS:
         raise ValueError(f"there is no method {name!r}: choose from {', '.join(METHODS)}")
     return METHODS[current]
-
-
-def _require(name: str, given: object, kind: type, remedy: str) -> None:
-    if not isinstance(given, kind):
-        raise TypeError(
-            f"{name} must be of type {kind.__name__}, got {type(given).__name__}: give {remedy}"
-        )
 
 
 def identify(
@@ -126,12 +120,12 @@ def identify(
     >>> low < 150.0 < high
     True
     """
-    _require("recording", recording, Recording, "what vf.read_recording returns")
-    _require("valve", valve, Valve, "vf.Valve(...), or the valve of vf.read_valve_file(...)")
+    require_type("recording", recording, "what vf.read_recording returns", Recording)
+    require_type("valve", valve, A_VALVE, Valve)
     if isinstance(settings, str):
         return method_named(settings)(recording, valve)
     if settings is not None:
-        _require("settings", settings, IdentificationSettings, "vf.IdentificationSettings(...)")
+        require_type("settings", settings, "vf.IdentificationSettings(...)", IdentificationSettings)
     return method_named(method)(recording, valve, settings)
 
 

@@ -32,6 +32,19 @@ def frozen(mapping: Mapping[Any, Any]) -> MappingProxyType[Any, Any]:
 copyreg.pickle(MappingProxyType, lambda one: (frozen, (dict(one),)))
 
 
+A_VALVE = "vf.Valve(...), or the valve of vf.read_valve_file(...)"
+"""What to give for a valve."""
+
+
+def require_type(name: str, given: object, remedy: str, *kinds: type) -> None:
+    """Raise TypeError with the remedy if an argument is of none of these types."""
+    if not isinstance(given, kinds):
+        known = " or ".join(kind.__name__ for kind in kinds)
+        raise TypeError(
+            f"{name} must be of type {known}, got {type(given).__name__}: give {remedy}"
+        )
+
+
 def require_row(name: str, values: object) -> NDArray[np.float64]:
     """Return a copy of a row of finite numbers, or raise ValueError with its name and the sample.
 
