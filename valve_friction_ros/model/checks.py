@@ -57,7 +57,7 @@ def require_row(name: str, values: object) -> NDArray[np.float64]:
     if row.ndim != 1 or row.size == 0:
         raise ValueError(f"{name} must be a row of samples, got shape {row.shape}")
     if isinstance(values, np.ma.MaskedArray):
-        row[np.ma.getmaskarray(values)] = np.nan
+        row[values.mask] = np.nan
     finite = np.isfinite(row)
     if not finite.all():
         raise ValueError(f"{name} is not finite at sample {int(np.argmin(finite))}")

@@ -233,7 +233,7 @@ class _Reader:
             there = cells.fillna("").astype(str).str.strip() != ""
         if self.layout.tag_place is not None:
             there = there & (block[self.layout.tag_place].str.strip() == signal.name)
-        return np.array(there, np.bool_)  # a copy: the array of pandas 3 is read-only
+        return there.to_numpy(np.bool_, copy=True)  # the array of pandas 3 itself is read-only
 
     def _count(
         self,
