@@ -112,7 +112,7 @@ def _stamps(columns: Mapping[str, Any]) -> NDArray[np.int64]:
         dates = given.dt if hasattr(given, "dt") else given
         given = dates.tz_convert("UTC").to_numpy("datetime64[ns]")
     kind = np.asarray(given).dtype.kind
-    if kind in "Mm" and not np.ma.isMaskedArray(given):
+    if kind in "Mm" and not isinstance(given, np.ma.MaskedArray):
         dated = np.asarray(given, f"{kind}8[ns]")
         if np.isnat(dated).any():
             raise ValueError(f"time_s has no date at sample {int(np.argmax(np.isnat(dated)))}")

@@ -233,7 +233,8 @@ class _Reader:
             there = cells.fillna("").astype(str).str.strip() != ""
         if self.layout.tag_place is not None:
             there = there & (block[self.layout.tag_place].str.strip() == signal.name)
-        return there.to_numpy(np.bool_, copy=True)  # the array of pandas 3 itself is read-only
+        # The array of pandas 3 itself is read-only.
+        return np.asarray(there.to_numpy(np.bool_, copy=True), np.bool_)
 
     def _count(
         self,
