@@ -112,6 +112,37 @@ class TestReadRecording:
         with pytest.raises(ValueError, match=message):
             vf.read_recording(given)
 
+    def test_a_masked_value_is_no_number(self, columns):
+        masked = np.ma.masked_array(columns["position_m"], mask=False)
+        found = vf.read_recording({**columns, "position_m": masked})
+        np.testing.assert_array_equal(found.position, columns["position_m"])
+        masked[7] = np.ma.masked
+        with pytest.raises(ValueError, match=r"^position_m is not finite at sample 7$"):
+            vf.read_recording({**columns, "position_m": masked})
+        with pytest.raises(ValueError, match=r"^position is not finite at sample 7$"):
+            vf.Recording(0.01, columns["pressure_pa"], masked)
+
+    @pytest.mark.parametrize(
+        ("changed", "message"),
+        [
+            ({"position_m": [0.0] * 2}, "^time_s has 3 samples, pressure_pa 3, position_m 2$"),
+            ({"position_m": [[0.0]] * 3}, "^position_m must be a row of samples, got shape"),
+            ({"position_m": [0.0, "Bad", 0.0]}, "^position_m must be a row of numbers: .*'Bad'$"),
+            ({"time_s": [0, 10**9, 2 * 10**10]}, "^time_s reaches 2e.10 s, which is after the"),
+            ({"time_s": np.array(["2026-01-01", "NaT", "NaT"], "M8[s]")}, "^time_s has no date at"),
+        ],
+    )
+    def test_impossible_columns_are_named(self, changed, message):
+        good = {"time_s": [0.0, 1.0, 2.0], "pressure_pa": [1.0] * 3, "position_m": [0.0] * 3}
+        with pytest.raises(ValueError, match=message):
+            vf.read_recording({**good, **changed})
+
+    @pytest.mark.parametrize("source", [None, ["a.csv", "b.csv"], np.zeros((3, 3))])
+    def test_a_source_of_another_type_is_named(self, source):
+        told = f"^source must be a path, a frame or .* got {type(source).__name__}; for a file per"
+        with pytest.raises(TypeError, match=told):
+            vf.read_recording(source)
+
 
 class TestResult:
     def test_the_table_has_a_line_a_parameter(self, result):
@@ -166,6 +197,28 @@ def test_methods_return_the_same_type(loose_record, benches):
     assert friction.value == friction.published
     assert friction.reason == "the published method gives no interval"
     assert math.isnan(published.rms)
+
+
+def test_arguments_of_other_types_are_named(columns, loose_record, benches):
+    valve = benches["low"].valve
+    for given, told in [
+        ((columns, valve), "^recording must be of type Recording, got dict: give what vf.read_rec"),
+        ((loose_record, "fv_101.yaml"), "^valve must be of type Valve, got str: give vf.Valve"),
+        ((loose_record, valve, {"order": 3}), "^settings must be of type Identification.* dict"),
+    ]:
+        with pytest.raises(TypeError, match=told):
+            vf.identify(*given)
+    result = vf.identify(loose_record, valve, "published")
+    with pytest.raises(TypeError, match=r"^baseline must be of type Baseline or Result, got float"):
+        vf.compare(result, 150.0)
+    with pytest.raises(TypeError, match=r"^parameters must be of type KarnoppParameters or Result"):
+        vf.simulate(valve, valve, loose_record.pressure, 0.01)
+
+
+def test_a_ratio_without_an_interval_says_so(loose_record, benches):
+    published = vf.identify(loose_record, benches["low"].valve, "published")
+    told = vf.compare(published, vf.Baseline(published.values["coulomb_friction"] / 1.5)).message
+    assert told.startswith("friction has grown: Coulomb friction is 1.50 (no interval) times its")
 
 
 def test_an_unknown_method_is_named(loose_record, benches):

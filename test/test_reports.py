@@ -192,7 +192,7 @@ def test_excess_friction_has_the_interval_of_both(with_friction):
     told = rows(with_friction(150.0, 3.0, baseline=Baseline(100.0, 4.0)), FRICTION)
     assert told["friction of the healthy valve (baseline)"] == ("Coulomb friction 100.0 ± 4.0 N",)
     assert told["excess friction"] == ("+50.0 ± 5.0 N",)
-    assert told["friction over baseline"][0].startswith("Coulomb friction: 1.50, 95 % interval ")
+    assert told["friction over baseline"][0].startswith("Coulomb friction: 1.50, 95 % interval: ")
     assert told["level"] == ("WARN, NE 107 status signal M",)
 
 
@@ -236,7 +236,7 @@ def test_what_the_valve_has_done(identified):
     assert told["time near 100 % of the travel [h]"] == ("0", "0")
     table, picture, words = blocks(used, "Use")
     assert picture.kind == "picture"
-    assert "1.5 m and 12 reversals in a day of watching" in words.text
+    assert "1.5 m and 12 reversals per day watched" in words.text
     assert table.columns[1].title == "since the packing was renewed, 1970-01-03"
     assert "Use" not in [one.title for one in identification_report(identified).sections]
 
@@ -359,9 +359,9 @@ class TestUncertaintyBudget:
 @pytest.mark.parametrize(
     ("systematic", "words"),
     [
-        (0.0, "Its 9 µm rms are not larger than the noise of the sensors."),
-        (3e-6, "Of 9 µm rms, 3 µm are more than noise, which does not put the model in doubt."),
-        (5e-6, "Of 9 µm rms, 5 µm are more than noise, which puts the model in doubt."),
+        (0.0, "Its 9 µm rms does not exceed the noise of the sensors."),
+        (3e-6, "Of 9 µm rms, 3 µm is more than noise, which does not put the model in doubt."),
+        (5e-6, "Of 9 µm rms, 5 µm is more than noise, which puts the model in doubt."),
     ],
 )
 def test_what_a_misfit_means(with_friction, systematic, words):

@@ -9,7 +9,7 @@
 
 """Functions of the public interface that combine several packages."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -21,6 +21,7 @@ from valve_friction_ros.health.baseline import Baseline
 from valve_friction_ros.health.diagnosis import Diagnosis, FrictionLimits
 from valve_friction_ros.health.valve_diagnosis import diagnose_valve
 from valve_friction_ros.identification.result import Result
+from valve_friction_ros.model.checks import A_VALVE, require_row, require_type
 from valve_friction_ros.model.drive import Drive
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.simulation import StemState, Trajectory
@@ -91,34 +92,55 @@ def read_recording(
 def _column(columns: Mapping[str, Any], name: str) -> NDArray[np.float64]:
     """Return a column as finite numbers; raises ValueError with its name if that fails."""
     if name not in columns:
-        known = ", ".join(map(str, columns))
-        raise ValueError(f"there is no column {name!r} among {known}: rename a column")
-    values = np.asarray(columns[name], dtype=np.float64)
-    finite = np.isfinite(values)
-    if not finite.all():
-        raise ValueError(f"{name} is not finite at sample {int(np.argmin(finite))}")
-    return values
+        names = [str(one)[:40] for one in getattr(columns, "columns", columns)]
+        known = ", ".join(names[:_MOST_NAMES]) + " …" * (len(names) > _MOST_NAMES)
+        raise ValueError(f"there is no column {name!r} among {known or 'none'}: rename a column")
+    return require_row(name, columns[name])
 
 
-def _stamps_of_index(columns: Mapping[str, Any]) -> NDArray[np.int64] | None:
-    """Return the dates in ``time_s`` or in a frame's index as ns since 1970; None without dates."""
+_MOST_NAMES = 12
+"""Names of columns in a message."""
+
+_LATEST = 2**63 / 1e9
+"""Seconds since 1970 beyond which nanoseconds do not fit into 64 bits, in the year 2262."""
+
+
+def _stamps(columns: Mapping[str, Any]) -> NDArray[np.int64]:
+    """Return ``time_s``, or the dates in a frame's index, as ns; dates count from 1970."""
     given: Any = columns["time_s"] if "time_s" in columns else getattr(columns, "index", None)
-    dtype = getattr(given, "dtype", None)
-    if isinstance(dtype, np.dtype) and dtype.kind == "M":
-        return np.asarray(given, "datetime64[ns]").astype(np.int64)
-    if getattr(dtype, "tz", None) is None:
-        return None
-    dates = given.dt if hasattr(given, "dt") else given
-    return np.asarray(dates.tz_convert("UTC").to_numpy("datetime64[ns]")).astype(np.int64)
+    if getattr(getattr(given, "dtype", None), "tz", None) is not None:  # pandas
+        dates = given.dt if hasattr(given, "dt") else given
+        given = dates.tz_convert("UTC").to_numpy("datetime64[ns]")
+    kind = np.asarray(given).dtype.kind
+    if kind in "Mm" and not isinstance(given, np.ma.MaskedArray):
+        dated = np.asarray(given, f"{kind}8[ns]")
+        if np.isnat(dated).any():
+            raise ValueError(f"time_s has no date at sample {int(np.argmax(np.isnat(dated)))}")
+        return dated.astype(np.int64)
+    seconds = _column(columns, "time_s")
+    if np.abs(seconds).max() >= _LATEST:
+        raise ValueError(
+            f"time_s reaches {np.abs(seconds).max():.3g} s, which is after the year 2262: give "
+            "seconds, or dates"
+        )
+    return np.rint(seconds * 1e9).astype(np.int64)
 
 
 def _from_columns(columns: Mapping[str, Any]) -> Recording:
+    if isinstance(columns, (Sequence, np.ndarray)) or not hasattr(columns, "__contains__"):
+        raise TypeError(
+            "source must be a path, a frame or a mapping of columns, got "
+            f"{type(columns).__name__}; for a file per signal give one of the paths, and the "
+            "others as ReadingOptions(beside=...)"
+        )
     is_force = "force_n" in columns and "pressure_pa" not in columns
     names = ("force_n" if is_force else "pressure_pa", "position_m")
-    stamps = _stamps_of_index(columns)
-    if stamps is None:
-        stamps = np.rint(_column(columns, "time_s") * 1e9).astype(np.int64)
+    stamps = _stamps(columns)
     drive, position = (_column(columns, name) for name in names)
+    if not stamps.size == drive.size == position.size:
+        raise ValueError(
+            f"time_s has {stamps.size} samples, {names[0]} {drive.size}, {names[1]} {position.size}"
+        )
     later = np.diff(stamps) > 0
     if not later.all():
         sample = int(np.argmin(later)) + 1
@@ -172,6 +194,14 @@ def simulate(
     >>> round(1e3 * float(stem.position[-1]), 1)
     20.9
     """
+    require_type("valve", valve, A_VALVE, Valve)
+    require_type(
+        "parameters",
+        parameters,
+        "a result, or vf.KarnoppParameters(...)",
+        KarnoppParameters,
+        Result,
+    )
     if isinstance(parameters, Result):
         parameters = parameters.simulated_model()
     return simulated(valve, parameters, drive, sample_period, start)
@@ -216,5 +246,7 @@ def compare(
     >>> diagnosis.level.name, round(diagnosis.ratio.value, 1)
     ('ERROR', 2.7)
     """
+    require_type("result", result, "what vf.identify returns", Result)
+    require_type("baseline", baseline, "a result, or vf.Baseline(friction in N)", Baseline, Result)
     healthy = Baseline.of(baseline) if isinstance(baseline, Result) else baseline
     return diagnose_valve(result, healthy, limits).friction

@@ -200,7 +200,7 @@ class Code(Enum):
     SAMPLE_OVERTAKEN = (
         "{signal} arrived out of order: its time stamp is slightly before the last one"
     )
-    SAMPLE_BACK = "{signal} returned in time"
+    SAMPLE_BACK = "{signal} went back in time"
     SENSOR_RANGE = "the sensor's range {lowest:g} to {highest:g} Pa"
     ANY_VALVE_RANGE = "the range of any valve, {lowest:g} to {highest:g} m"
     DATA_FAULT = "{signal:or the stamps}: {cause:of}{cause:?, |}{kind:of}"
@@ -567,7 +567,13 @@ def _difference(change: tuple[float, float, float], unit: str) -> str:
 
 def _ratio(change: tuple[float, float, float], digits: str, times: str = "") -> str:
     value, low, high = (format(one, digits) for one in change)
-    return f"{value}{times} ({low} to {high})"
+    interval = "no interval" if math.isnan(change[1]) else f"{low} to {high}"
+    return f"{value}{times} ({interval})"
+
+
+def ratio_interval(low: float, high: float) -> str:
+    """Write the 95 % interval of a ratio, or that there is none."""
+    return "no interval" if math.isnan(low) else f"95 % interval: {low:.2f} to {high:.2f}"
 
 
 def _in_unit(value: float, details: str) -> str:

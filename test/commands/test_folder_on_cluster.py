@@ -128,7 +128,7 @@ def test_what_a_worker_does_not_see(address, folder, arguments, command, monkeyp
     monkeypatch.setattr("valve_friction_ros.commands.identify_folder.finished", vanished)
     code, _, err = command("identify-folder", *arguments, "--scheduler", address)
     assert code == 2
-    assert "a.csv is not there on " in rows_of(arguments[2])["a.csv"]["error"]
+    assert "a.csv does not exist on " in rows_of(arguments[2])["a.csv"]["error"]
     assert "give all workers the folder under this path" in err
 
 
@@ -150,7 +150,7 @@ def test_a_worker_without_the_package(folder, arguments, refused, tmp_path):
         finally:
             worker.terminate()
             worker.wait(PATIENCE)
-    assert "a worker is unlike this machine (tcp://" in line
+    assert "a worker differs from this machine (tcp://" in line
     assert "No module named 'valve_friction_ros'): install valve_friction_ros " in line
     assert not arguments[2].exists()
 

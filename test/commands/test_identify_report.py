@@ -182,7 +182,7 @@ def test_why_published_values_differ_is_told_beside_them(reported, quick_csv):
     page, answer = reported(quick_csv, "--method", "bench")
     (told,) = (text for text in page.said("p") if text.startswith("Published method: "))
     assert f"faster than δv = {answer['evidence']['threshold']:.3g} m/s" in told
-    assert "Where the two differ, trust the column value." in told
+    assert "If the two differ, trust the value, not the published one." in told
     for name, one in answer["parameters"].items():
         if one["published"] is not None and one["half_width"]:
             is_beyond = abs(one["published"] - one["value"]) > one["half_width"]

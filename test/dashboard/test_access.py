@@ -75,7 +75,7 @@ def test_lengths_that_are_refused(length):
 def test_hashes_that_are_refused(change):
     text = str(quick_hash())
     wrong = text.replace(*change, 1) if isinstance(change, tuple) else text[:change]
-    with pytest.raises(ValueError, match="no usable hash") as raised:
+    with pytest.raises(ValueError, match="usable password hash") as raised:
         HashedPassword.read(wrong)
     assert text[-20:] not in str(raised.value)
 
@@ -112,11 +112,11 @@ def test_a_file_that_others_can_read_is_refused(tmp_path, mode):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("{anna}\n{anna}", "line 2: 'anna' is there twice"),
+        ("{anna}\n{anna}", "line 2: 'anna' is given twice"),
         ("anna operate", "line 1: not NAME, role"),
         ("anna admin {hash}", "line 1: not NAME, role"),
         ("an/na view {hash}", "line 1: the name of an account"),
-        ("anna view plaintext-password", "line 1: no usable hash"),
+        ("anna view plaintext-password", "line 1: not a usable password hash"),
         ("# nobody", "holds no account"),
         ("", "holds no account"),
     ],
@@ -154,7 +154,9 @@ def test_this_machine_needs_no_account(host):
 
 @pytest.mark.parametrize("host", ["0.0.0.0", "::", "10.1.2.3", "fd00::1", "plant.example", ""])
 def test_any_other_address_needs_accounts(host):
-    with pytest.raises(ValueError, match="there are no accounts: make one by `valve_friction dash"):
+    with pytest.raises(
+        ValueError, match="there are no accounts: make one with `valve_friction dash"
+    ):
         Access(host)
     assert "passwords and sessions can be read on the way" in Access(host, accounts=(ANNA,)).warning
 

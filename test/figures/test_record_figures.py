@@ -324,7 +324,7 @@ class TestPictures:
         ("name", "words"),
         [
             *((one, "the ending is not a picture format; choose .png, .pdf or .svg")
-              for one in ("figure", "figure.", "figure.csv", "figure.gif", "png")),
+              for one in ("figure", "figure.", "figure.csv", "figure.bmp", "png")),
             ("none/figure.png", "there is no folder"),
         ],
     )  # fmt: skip

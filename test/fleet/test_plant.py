@@ -434,6 +434,13 @@ class TestTable:
         assert found.valve.pressure_maximum == pytest.approx(4e5)
         assert found.known["spring_constant"] == pytest.approx(0.0445 * 1.2e5 / 0.028575)
 
+    def test_a_cell_may_have_its_own_unit_as_on_the_page(self, tmp_path):
+        path, page = tmp_path / "valves.csv", Path(__file__).parents[2] / "doc/how_to/folder.md"
+        path.write_text(re.findall(r"```text\n(tag;area.*?)```", page.read_text(), re.DOTALL)[0])
+        first, second = (read_plant(path)[tag].valve for tag in ("FV-101", "FV-102"))
+        assert (first.diaphragm_area, first.travel) == pytest.approx((0.069, 0.0286))
+        assert (second.diaphragm_area, second.travel) == pytest.approx((0.06903212, 0.028575))
+
 
 @pytest.mark.parametrize(
     ("text", "found"),

@@ -159,7 +159,9 @@ def test_other_versions_of_libraries_are_noted(workers, monkeypatch):
 def test_the_last_worker_goes(monkeypatch):
     monkeypatch.setattr(sharing, "NO_WORKER", 0.5)
     with local_cluster(workers=0) as empty, cluster_at(empty.scheduler_address) as found:
-        with pytest.raises(ValueError, match=r"no worker has come in 0\.5 s: start some by `dask"):
+        with pytest.raises(
+            ValueError, match=r"no worker has joined within 0\.5 s: start one with `dask"
+        ):
             found.compare()
         with pytest.raises(ValueError, match="no worker has come"):
             list(in_cluster(found, answer, "a", never))

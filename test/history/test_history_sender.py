@@ -166,7 +166,7 @@ class TestFaults:
                 assert time.monotonic() - begun < 5.0
                 postgres.start()
                 wait_until_sent(sender)
-                assert sender.news() == f"{database}: the history is sent again"
+                assert sender.news() == f"{database}: the history is being sent again"
         finally:
             postgres.start()
         assert all_of(History(database)) == all_of(history)

@@ -209,7 +209,7 @@ class TestTrouble:
         with pytest.raises(ValueError, match=r"history_url holds a password.*pgpass") as error:
             server_from(outer[name], environment={})
         assert "s3cret" not in str(error.value)
-        with pytest.raises(ValueError, match=f"{name}: no address"):
+        with pytest.raises(ValueError, match=f"{name}: not the address"):
             server_from("", environment={name: "s3cret"})
 
     def test_a_server_that_stands_still_is_left(self, history, server, postgres, monkeypatch):

@@ -156,7 +156,7 @@ def test_read_only_folder():
     count, old, new = told.splitlines()
     assert count == "1"
     assert "readonly database: make the file and its folder writable, or name another" in old
-    assert "unable to open database file: check that the folder is there and writable" in new
+    assert "unable to open database file: check that the folder exists and is writable" in new
 
 
 def test_newer_schema(history):

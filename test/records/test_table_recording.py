@@ -236,6 +236,12 @@ class TestUnitsAndLayout:
 
 
 class TestStretch:
+    def test_arrays_of_pandas_may_be_read_only(self, write):
+        pandas = pytest.importorskip("pandas")
+        path = write([HEADER, *GOOD])
+        with pandas.option_context("mode.copy_on_write", True):  # as always from pandas 3 on
+            assert len(read_csv(path, stretch=Stretch(begin=0.01))) == 30
+
     @pytest.mark.parametrize(
         ("stretch", "first", "last"),
         [

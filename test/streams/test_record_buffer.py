@@ -248,7 +248,7 @@ def test_each_sample_is_counted_as_taken_or_by_the_cause_of_its_rejection(buffer
     assert buffer.taken == 5000 + 3
     assert {str(one): number for one, number in buffer.rejected.items()} == {
         RANGE: 2,
-        "actuator_pressure returned in time": 1,
+        "actuator_pressure went back in time": 1,
         "actuator_pressure is not finite": 1,
         "stem_state repeats a time stamp": 1,
     }

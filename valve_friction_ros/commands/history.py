@@ -111,7 +111,7 @@ def _answers(response: ResponseSummary) -> str:
 def _words(usage: Usage) -> str:
     return (
         f"{usage.distance:.5g} m of travel, {usage.reversals} reversals, {usage.breakaways} "
-        f"breakaways in {usage.time_watched / _HOUR:.4g} h of watching"
+        f"breakaways in {usage.time_watched / _HOUR:.4g} h watched"
     )
 
 
@@ -146,8 +146,8 @@ def _print_usage_table(
                 console.print(line)
         if (pace := usage.pace()) is not None:
             console.print(
-                f"pace of the last days: {pace.distance:.4g} m and {pace.reversals:.4g} reversals "
-                "in a day of watching"
+                f"recent pace: {pace.distance:.4g} m and {pace.reversals:.4g} reversals per day "
+                "watched"
             )
         console.print()
 

@@ -90,7 +90,7 @@ class HashedPassword:
             and len(self.salt) >= _SALT
             and len(self.digest) >= _DIGEST
         ):
-            raise ValueError("no usable hash of a password")
+            raise ValueError("not a usable password hash")
 
     @classmethod
     def of(cls, password: str) -> "HashedPassword":
@@ -123,7 +123,7 @@ class HashedPassword:
             return cls(int(cost), int(block), int(parallel), _decoded(salt), _decoded(digest))
         except (ValueError, binascii.Error):
             raise ValueError(
-                "no usable hash of a password: make one by `valve_friction dashboard-account`"
+                "not a usable password hash: make one with `valve_friction dashboard-account`"
             ) from None
 
     def __str__(self) -> str:
@@ -214,11 +214,11 @@ def _read(text: str, source: str) -> tuple[Account, ...]:
         except ValueError as error:
             raise ValueError(f"{source}, line {number}: {error}") from None
         if account.name in found:
-            raise ValueError(f"{source}, line {number}: {account.name!r} is there twice")
+            raise ValueError(f"{source}, line {number}: {account.name!r} is given twice")
         found[account.name] = account
     if not found:
         raise ValueError(
-            f"{source} holds no account: add one by `valve_friction dashboard-account`"
+            f"{source} holds no account: add one with `valve_friction dashboard-account`"
         )
     return tuple(found.values())
 
@@ -288,9 +288,9 @@ class Access:
         """Refuse options that would let anybody in."""
         if not self.accounts and (not is_loopback(self.host) or self.host_names):
             raise ValueError(
-                f"host {self.host!r} lets others in, and there are no accounts: make one by "
-                "`valve_friction dashboard-account NAME >> FILE; chmod 600 FILE` and give the "
-                f"parameter accounts_file (or its lines in {VARIABLE}), or use 127.0.0.1"
+                f"host {self.host!r} is open to other machines, but there are no accounts: make "
+                "one with `valve_friction dashboard-account NAME >> FILE; chmod 600 FILE` and set "
+                f"accounts_file (or put its lines into {VARIABLE}), or use 127.0.0.1"
             )
         if not 0 < self.session_hours <= 10_000:
             raise ValueError(f"session_hours is {self.session_hours:g}: give 0 to 10000")

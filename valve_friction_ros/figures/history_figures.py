@@ -370,7 +370,7 @@ def usage_figure(usage: ValveUsage, is_narrow: bool = False) -> Figure:
     last = [one for one in usage.days if one.renewal == usage.renewal][-_DAYS_SHOWN:]
     dates = np.array([np.datetime64(int(one.day * DAY), "ns") for one in last], "datetime64[D]")
     days.bar(dates, [one.usage.distance for one in last], color=_USAGE_COLOUR)
-    first = min(dates[0], dates[-1] - (_FEWEST_DAYS - 1))
+    first = min(dates[0], dates[-1] - np.timedelta64(_FEWEST_DAYS - 1, "D"))
     half = np.timedelta64(12, "h")
     days.set_xlim(first - half, dates[-1] + half)
     _tick_dates(days, 5, least=2)

@@ -415,7 +415,7 @@ def identify_job_elsewhere(job: Job) -> list[Mapping[str, Cell]]:
     if is_there:
         return identify_job(job)
     reason = (
-        f"{job.path} is not there on {socket.gethostname()}: give all workers the folder under "
+        f"{job.path} does not exist on {socket.gethostname()}: give all workers the folder under "
         "this path, or put it into an object store"
     )
     return [error_cells("", reason, job.path)]

@@ -13,7 +13,8 @@ import csv
 import hashlib
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from types import MappingProxyType
@@ -194,15 +195,25 @@ _MOST_SIGNALS = 3
 _KNOWN = [*_WORDS, *_NUMBERS, *(each.name for each in fields(Columns))]
 
 
+def _value(read: Callable[[str], Any], cell: str, unit: str) -> Any:
+    """Read a number in the unit of its column, unless the cell has a unit of its own."""
+    try:
+        return read(f"{cell} {unit}".strip())
+    except ValueError:
+        with suppress(ValueError):
+            return read(cell)
+        raise
+
+
 def _row(cells: Mapping[str, tuple[str, str]]) -> str:
     """Return the valve file of a row; each cell comes with the unit of its column."""
     values: dict[str, Any] = {}
     columns: dict[str, Any] = {}
     for name, (cell, unit) in cells.items():
-        text = f"{cell} {unit}" if unit else cell
+        number = _NUMBERS.get(name)
         try:
-            if name in _NUMBERS:
-                values[_NUMBERS[name]] = _READ[_NUMBERS[name]](text)
+            if number is not None:
+                values[number] = _value(_READ[number], cell, unit)
             elif name not in _WORDS:
                 columns[name] = yaml.safe_load(cell) if cell.lower() in ("true", "false") else cell
         except ValueError as error:

@@ -80,8 +80,8 @@ class ResultsFile(contextlib.AbstractContextManager["ResultsFile"]):
         for output in self._outputs:
             if output.is_file() and not self._database.exists():
                 raise ValueError(
-                    f"{output}: it is there, but not {self._database.name}, which it would have "
-                    "been written from: give another output, or move the file away"
+                    f"{output}: it exists, but {self._database.name}, which holds its rows, does "
+                    "not: give another output, or move the file away"
                 )
         with self._explained():
             self._connection = sqlite3.connect(self._database, timeout=0)
@@ -123,7 +123,7 @@ class ResultsFile(contextlib.AbstractContextManager["ResultsFile"]):
         try:
             yield
         except sqlite3.Error as error:
-            locked = "another run is writing it: wait for its end"
+            locked = "another run is writing it: wait until it finishes"
             cause = locked if "locked" in str(error) else str(error)
             raise ValueError(f"{self._database}: {cause}") from None
 

@@ -75,7 +75,7 @@ def _end_of_process(exit_code: int) -> str:
         return f"its process ended with exit code {exit_code}"
     number = -exit_code
     name = signal.Signals(number).name if number in set(signal.Signals) else str(number)
-    hint = ", as a system does that runs out of memory" if number == signal.SIGKILL else ""
+    hint = ", perhaps because the system ran out of memory" if number == signal.SIGKILL else ""
     return f"its process was killed by {name}{hint}"
 
 
@@ -283,19 +283,19 @@ class Cluster:
 
     def gone(self) -> str:
         """Return the message that the scheduler has gone."""
-        return f"{self.address}: the scheduler has gone: once it is back, the same command goes on"
+        return f"{self.address}: the scheduler is gone: once it is back, run the command again"
 
     def differs(self, cause: str) -> str:
         """Return the message that a worker cannot do the work."""
         return (
-            f"{self.address}: a worker is unlike this machine ({cause}): install {PACKAGE} "
+            f"{self.address}: a worker differs from this machine ({cause}): install {PACKAGE} "
             f"{__version__} with the same extras on all of them"
         )
 
     def without_workers(self) -> str:
         """Return the message that there is no worker."""
         return (
-            f"{self.address}: no worker has come in {NO_WORKER:g} s: start some by "
+            f"{self.address}: no worker has joined within {NO_WORKER:g} s: start one with "
             f"`dask worker {self.address} --nthreads 1`"
         )
 
@@ -482,8 +482,8 @@ def _cause(error: Exception) -> str:
         times = error.allowed_failures + 1
         where = error.last_worker.address
         return (
-            f"the process of its worker died {times} times, last that of {where}, as it does on a "
-            "machine that runs out of memory"
+            f"its worker process died {times} times, last on {where}, perhaps because the machine "
+            "ran out of memory"
         )
     return " ".join(f"unexpected {type(error).__name__} of its worker: {error}".split())
 

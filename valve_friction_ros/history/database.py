@@ -64,7 +64,7 @@ _AWAY = "check that the server runs, and that this machine reaches it"
 _REMEDIES_OF_FILE = (
     ("disk is full", "make room on its disk"),
     ("readonly", f"make the file and its folder writable, {_ANOTHER}"),
-    ("unable to open", f"check that the folder is there and writable, {_ANOTHER}"),
+    ("unable to open", f"check that the folder exists and is writable, {_ANOTHER}"),
     ("disk I/O error", "check the disk, its free space and the process's limits"),
     ("locked", "find the process that holds it, and end it"),
     (
@@ -81,8 +81,8 @@ _REMEDIES_OF_SERVER = (
     ("permission denied for schema", _OWNER),
     ("must be owner", _OWNER),
     ("permission denied", "give this role the rights that doc/how_to/history_server.md lists"),
-    ("read-only transaction", "name the server that takes writes, or target_session_attrs"),
-    ("does not exist", "make it, or name another database or role"),
+    ("read-only transaction", "name the server that accepts writes, or set target_session_attrs"),
+    ("does not exist", "create it, or name another database or role"),
     ("No space left", "make room on the disk of the server"),
     ("no encryption", _TLS),
     ("SSL", _TLS),
@@ -370,7 +370,7 @@ def _reading_server(server: HistoryServer) -> Iterator[tuple[Connection, int]]:
         connection.execution_options(isolation_level="REPEATABLE READ")
         if not (version := _version_on_server(connection, server)):
             raise HistoryError(
-                f"{server}: holds no history: `valve_friction history copy` makes its tables"
+                f"{server}: holds no history: `valve_friction history copy` creates its tables"
             )
         yield connection, version
 

@@ -392,7 +392,7 @@ class Sender:
             return None
         before, self._told = self._told, problem
         if problem is None:
-            return None if before is None else f"{self.server}: the history is sent again"
+            return None if before is None else f"{self.server}: the history is being sent again"
         return f"the history waits in {self._path}: {problem}"
 
     def end(self) -> None:

@@ -49,7 +49,9 @@ class HistoryServer:
     def __post_init__(self) -> None:
         """Refuse an invalid address without repeating it."""
         if not is_url(self.url) or not self.url.isprintable() or " " in self.url:
-            raise ValueError("no address of a server: write it as postgresql://user@host/database")
+            raise ValueError(
+                "not the address of a server: write it as postgresql://user@host/database"
+            )
         try:
             urlsplit(self.url)
         except ValueError:

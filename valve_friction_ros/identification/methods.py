@@ -33,6 +33,7 @@ from valve_friction_ros.model import (
     compile_kernels,
     simulate,
 )
+from valve_friction_ros.model.checks import A_VALVE, require_type
 from valve_friction_ros.model.valve import Valve
 
 
@@ -101,6 +102,8 @@ def identify(
         If the record does not determine the friction; the message names cause and remedy.
     ValueError
         If no method has this name.
+    TypeError
+        If an argument has another type, such as a frame in place of a recording.
 
     Examples
     --------
@@ -117,8 +120,12 @@ def identify(
     >>> low < 150.0 < high
     True
     """
+    require_type("recording", recording, "what vf.read_recording returns", Recording)
+    require_type("valve", valve, A_VALVE, Valve)
     if isinstance(settings, str):
         return method_named(settings)(recording, valve)
+    if settings is not None:
+        require_type("settings", settings, "vf.IdentificationSettings(...)", IdentificationSettings)
     return method_named(method)(recording, valve, settings)
 
 

@@ -15,8 +15,12 @@ Python neither copies nor pickles a read-only mapping; those of `frozen` can be 
 import copyreg
 import math
 from collections.abc import Mapping
+from decimal import Decimal
 from types import MappingProxyType
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 
 def frozen(mapping: Mapping[Any, Any]) -> MappingProxyType[Any, Any]:
@@ -28,9 +32,41 @@ def frozen(mapping: Mapping[Any, Any]) -> MappingProxyType[Any, Any]:
 copyreg.pickle(MappingProxyType, lambda one: (frozen, (dict(one),)))
 
 
+A_VALVE = "vf.Valve(...), or the valve of vf.read_valve_file(...)"
+"""What to give for a valve."""
+
+
+def require_type(name: str, given: object, remedy: str, *kinds: type) -> None:
+    """Raise TypeError with the remedy if an argument is of none of these types."""
+    if not isinstance(given, kinds):
+        known = " or ".join(kind.__name__ for kind in kinds)
+        raise TypeError(
+            f"{name} must be of type {known}, got {type(given).__name__}: give {remedy}"
+        )
+
+
+def require_row(name: str, values: object) -> NDArray[np.float64]:
+    """Return a copy of a row of finite numbers, or raise ValueError with its name and the sample.
+
+    A masked value of a numpy array is no number.
+    """
+    try:
+        row = np.array(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"{name} must be a row of numbers: {error}") from None
+    if row.ndim != 1 or row.size == 0:
+        raise ValueError(f"{name} must be a row of samples, got shape {row.shape}")
+    if isinstance(values, np.ma.MaskedArray):
+        row[values.mask] = np.nan
+    finite = np.isfinite(row)
+    if not finite.all():
+        raise ValueError(f"{name} is not finite at sample {int(np.argmin(finite))}")
+    return row
+
+
 def require_finite(name: str, value: float) -> float:
     """Return `value` as a float, or raise ValueError if it is not a finite number."""
-    if isinstance(value, (bool, str)):
+    if isinstance(value, (bool, str, Decimal)):
         raise ValueError(f"{name} must be a number, got {value!r}")
     try:
         number = float(value)

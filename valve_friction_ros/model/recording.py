@@ -16,7 +16,12 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from valve_friction_ros.model.checks import require_finite, require_non_negative, require_positive
+from valve_friction_ros.model.checks import (
+    require_finite,
+    require_non_negative,
+    require_positive,
+    require_row,
+)
 from valve_friction_ros.model.drive import DEFAULT_LAG, Drive
 
 
@@ -133,13 +138,8 @@ class Recording:
         require_positive("sample_period", self.sample_period)
         require_finite("start_time", self.start_time)
         for name in ("drive", "position"):
-            values = np.array(getattr(self, name), dtype=np.float64)
             words = self.driven_by.words if name == "drive" else name
-            if values.ndim != 1 or values.size == 0:
-                raise ValueError(f"{words} must be a row of samples, got shape {values.shape}")
-            finite = np.isfinite(values)
-            if not finite.all():
-                raise ValueError(f"{words} is not finite at sample {int(np.argmin(finite))}")
+            values = require_row(words, getattr(self, name))
             largest = int(np.argmax(np.abs(values)))
             if abs(values[largest]) > _LARGEST:
                 raise ValueError(

@@ -127,7 +127,8 @@ class Simulator(PacedNode):
         if self._stamp is None or stamp < self._stamp:
             if self._stamp is not None:
                 self.get_logger().warning(
-                    "stamps returned: the stem starts anew, at rest", throttle_duration_sec=5.0
+                    "time stamps went backwards: the stem starts again from rest",
+                    throttle_duration_sec=5.0,
                 )
             self._state = balanced_state(valve, parameters, pressure)
         else:

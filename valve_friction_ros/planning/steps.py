@@ -198,7 +198,7 @@ def form_of(
         "BEFORE   [ ] operations agree   [ ] loop in manual   [ ] nobody near the stem",
         f"         [ ] signal brought slowly to {100 * steps[0].share:.1f} % "
         f"({steps[0].milliamperes:.2f} mA, {pressure.shown(steps[0].pressure, 2)} {of_air})   "
-        "[ ] recording of pressure and stem runs",
+        "[ ] pressure and stem are being recorded",
         "",
         "ABORT    and go back slowly to the signal before the test, if",
         f"         the stem is below {100 * low:.0f} % ({lowest} {of_stem}) or above "

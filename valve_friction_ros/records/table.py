@@ -228,12 +228,13 @@ class _Reader:
     ) -> NDArray[np.bool_]:
         """Return which rows have a value of a signal; an empty entry is not a value."""
         if cells.dtype.kind in "fiu":
-            there = cells.notna().to_numpy()
+            there = cells.notna()
         else:
-            there = (cells.fillna("").astype(str).str.strip() != "").to_numpy()
+            there = cells.fillna("").astype(str).str.strip() != ""
         if self.layout.tag_place is not None:
-            there &= (block[self.layout.tag_place].str.strip() == signal.name).to_numpy()
-        return np.asarray(there, np.bool_)
+            there = there & (block[self.layout.tag_place].str.strip() == signal.name)
+        # The array of pandas 3 itself is read-only.
+        return np.asarray(there.to_numpy(np.bool_, copy=True), np.bool_)
 
     def _count(
         self,

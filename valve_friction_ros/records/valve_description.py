@@ -94,7 +94,7 @@ def _valve(answers: Mapping[str, Any]) -> Iterator[_Entry]:
         yield "pressure_minimum", low, f"Pa, {low / 1e5:.4g} bar: range of the sensor"
         yield "pressure_maximum", high, f"Pa, {high / 1e5:.4g} bar"
     if answers.get("mass") is not None:
-        yield "assumed_mass", answers["mass"], "kg, where a record does not tell it"
+        yield "assumed_mass", answers["mass"], "kg, if a record does not determine it"
     if answers.get("spring_range") is not None:
         low, high = answers["spring_range"]
         words = f"of the spring range {low / 1e5:.4g} to {high / 1e5:.4g} bar"

@@ -159,11 +159,11 @@ def _trend(history: ValveHistory) -> Section:
     trend, days = history.trend, len({entry.time // DAY for entry in history.entries})
     size = len(history.entries)
     count = f"{size} identification{'s' * (size > 1)} on {days} day{'s' * (days > 1)}"
-    told = f"{count}. No drift is told: that needs the frictions of four days, by one method."
+    told = f"{count}. No drift yet: it needs friction from four days or more, by one method."
     if trend is not None:
         told = f"{count}. Drift of the {trend.what}: {drift_text(trend)}."
         if not trend.is_significant:
-            told += " Its interval holds zero: no drift is proved."
+            told += " Its interval includes zero, so the drift is not significant."
     now = time.time_ns()
     picture = Picture(
         report_trend_figure(history, now),
@@ -238,17 +238,17 @@ def _noise_words(misfit: Misfit | None) -> str:
     if misfit is None:
         return ""
     if misfit.systematic < _ALL_NOISE * misfit.rms:
-        return f" Its {misfit.rms * 1e6:.3g} µm rms are not larger than the noise of the sensors."
+        return f" Its {misfit.rms * 1e6:.3g} µm rms does not exceed the noise of the sensors."
     return (
-        f" Of {misfit.rms * 1e6:.3g} µm rms, {misfit.systematic * 1e6:.3g} µm are more than noise, "
+        f" Of {misfit.rms * 1e6:.3g} µm rms, {misfit.systematic * 1e6:.3g} µm is more than noise, "
         f"which {'does not put' if misfit.describes else 'puts'} the model in doubt."
     )
 
 
 _MEANING = (
-    "A stroke counts where it is longer than the counting dead band, so noise counts nothing; a "
-    "breakaway is a start after a rest of a whole second of the stamps. Time that was "
-    "not watched counts nowhere."
+    "A stroke is counted only if it exceeds the counting dead band, so noise is not counted. A "
+    "breakaway is a start after a rest of one second or more. Time that was not watched is not "
+    "included anywhere."
 )
 
 
@@ -281,8 +281,8 @@ def usage_section(
     words, pace = _MEANING, usage.pace()
     if pace is not None:
         words += (
-            f" Pace of the last days: {pace.distance:.3g} m and {pace.reversals:.3g} reversals in "
-            "a day of watching."
+            f" Recent pace: {pace.distance:.3g} m and {pace.reversals:.3g} reversals per day "
+            "watched."
         )
     if not used.time_watched:
         return Section("Use", (table, *life, Paragraph(words)))

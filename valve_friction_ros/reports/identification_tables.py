@@ -34,7 +34,13 @@ from valve_friction_ros.identification import (
 )
 from valve_friction_ros.reports.identified_record import IdentifiedRecord, began
 from valve_friction_ros.reports.page import Column, PageTable, Verbatim
-from valve_friction_ros.wording import in_zone, name_in_words, percentage, with_width
+from valve_friction_ros.wording import (
+    in_zone,
+    name_in_words,
+    percentage,
+    ratio_interval,
+    with_width,
+)
 
 _WORDS = {
     "mass": "moving mass m",
@@ -160,14 +166,13 @@ def friction_table(record: IdentifiedRecord) -> PageTable:
             ("excess friction", f"{'+' * (excess > 0)}{with_width(excess, width)} N"),
             (
                 "friction over baseline",
-                f"{ratio.what}: {ratio.value:.2f}, "
-                f"95 % interval {ratio.low:.2f} to {ratio.high:.2f}",
+                f"{ratio.what}: {ratio.value:.2f}, {ratio_interval(ratio.low, ratio.high)}",
             ),
             (
                 "limits of that ratio",
                 f"collapsed below {limits.low_ratio:g}, worth maintenance above "
                 f"{limits.warn_ratio:g}, excessive above {limits.error_ratio:g}; "
-                "a limit counts as passed when the whole interval lies beyond it",
+                "a limit is exceeded if the whole interval lies beyond it",
             ),
         ]
     share = dead_band(record.result, record.valve)
@@ -325,7 +330,7 @@ def published_words(result: Result) -> str:
         "Published method: the regression of the paper, for comparison. It uses derivatives of "
         f"the smoothed position, and only {samples}. Noise, smoothing, lags and slow sliding bias "
         f"it; it has no interval, and yields a number even where the record determines none. "
-        f"{_how_else(result)}Where the two differ, trust the column value."
+        f"{_how_else(result)}If the two differ, trust the value, not the published one."
     )
     outside = [one for one in beside if 0 < one.half_width < abs(one.published - one.value)]
     if not outside:

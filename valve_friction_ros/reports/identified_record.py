@@ -47,6 +47,7 @@ from valve_friction_ros.wording import (
     friction_advice,
     in_zone,
     percentage,
+    ratio_interval,
     with_width,
 )
 
@@ -222,7 +223,7 @@ def date_line(record: IdentifiedRecord) -> str:
 
 
 _CHECK = "check the sensors and their mounting, then identify it again"
-_AS_BASELINE = "move the valve as its baseline was taken, and identify it again"
+_AS_BASELINE = "move the valve as for its baseline, and identify it again"
 _BASELINE = "set a baseline, the friction of the healthy valve"
 
 _STATE_WORDS = {
@@ -237,7 +238,7 @@ _STATE_WORDS = {
 _SURVEY_ADVICE = {
     Survey.BAD: "plan work on the packing: its loop will oscillate; set a baseline afterwards",
     Survey.WATCH: "record it again within three months, and set a baseline",
-    Survey.GOOD: "set a baseline: this record may be one",
+    Survey.GOOD: "set a baseline: this record is suitable",
 }
 
 
@@ -314,8 +315,8 @@ def _found(record: IdentifiedRecord) -> tuple[str, str]:
         found = f"the friction is {size} N{_sureness(friction)}"
         return found, f"to find out whether it has grown, {advice}"
     ratio = (
-        f"{diagnosis.ratio.value:.2f} times that of the healthy valve (95 % interval: "
-        f"{diagnosis.ratio.low:.2f} to {diagnosis.ratio.high:.2f}){_sureness(friction)}"
+        f"{diagnosis.ratio.value:.2f} times that of the healthy valve "
+        f"({ratio_interval(diagnosis.ratio.low, diagnosis.ratio.high)}){_sureness(friction)}"
     )
     if record.is_scaled:
         advice = (
