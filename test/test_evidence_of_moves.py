@@ -602,6 +602,37 @@ class TestChange:
         assert change.earliest <= START + 3.0 * HOUR <= change.latest
         assert change.latest - change.earliest < HOUR
 
+    @pytest.mark.parametrize("seed", range(3))
+    def test_a_step_that_a_loop_works_off_in_one_direction_is_no_change(self, seed):
+        """Each step pushes the stem away by a fifth of the travel, and 25 moves bring it back.
+
+        By the hours alone, the first moves of a level have one direction, which does not tell
+        preload and friction apart.
+        """
+        random = np.random.default_rng([seed, 6])
+        made, place, process, time = [], 0.5, 0.0, START
+        ways: list[float] = []
+        for number in range(1200):
+            step = 0.0
+            if number % 190 == 100:
+                step = random.choice([-1.0, 1.0]) * random.uniform(1200.0, 2000.0)
+                ways = [float(np.sign(step))] * 25  # a force against the pressure pushes down
+            way = -np.sign(step) or (ways.pop() if ways else random.choice([-1.0, 1.0]))
+            if not ways and not step:
+                way = np.sign(0.5 - place) if abs(place - 0.5) > 0.1 else way
+            far = 0.2 if step else 0.008
+            start, stop = place * VALVE.travel, (place + way * far) * VALVE.travel
+            force = 2e5 * 0.5 * (start + stop) + 1e3 + process + 0.5 * step + way * 300.0
+            end = time + 4_000_000_000
+            made.append(Move(time, end, start, stop, force + random.normal(0.0, 5.0), 0.0, 1e-3))
+            place, process, time = place + way * far, process + step, time + 60_000_000_000
+        found = evidence_of(made, VALVE)
+        assert found.changes == ()
+        one = found.parameters["sliding_friction"]
+        assert abs(one.value - 300.0) < one.half_width < 0.1 * 300.0
+        for last in range(300, 1200, 50):
+            assert evidence_of(made[:last], VALVE).changes == ()
+
     def test_the_ratio_of_a_change_holds_a_lag(self):
         """30 ms of late pressure take 0.03 s × 2000 N/s from 300 N and from 450 N alike."""
         late = made_moves(4.0, changing_at(3.0))

@@ -147,8 +147,8 @@ class Split(NamedTuple):
 
     @property
     def is_declared(self) -> bool:
-        """Whether it is large enough to be declared."""
-        return abs(math.log(self.size)) >= math.log1p(DECLARED)
+        """Whether it is large enough to be declared, with and without the blocks beside it."""
+        return min(abs(math.log(one)) for one in (self.size, self.ratio)) >= math.log1p(DECLARED)
 
 
 def last_splits(series: Series) -> tuple[Split, ...]:
