@@ -148,33 +148,40 @@ class Split(NamedTuple):
     @property
     def is_declared(self) -> bool:
         """Whether it is large enough to be declared, with and without the blocks beside it."""
-        return min(abs(math.log(one)) for one in (self.size, self.ratio)) >= math.log1p(DECLARED)
+        return _is_large(self.size) and _is_large(self.ratio)
 
 
-def splits_of(series: Series) -> tuple[Split, ...]:
-    """Return the changes of a series, each between the blocks since the one before and to the next.
+def splits_of(series: Series) -> tuple[int, tuple[Split, ...]]:
+    """Return the first block after the last change of a series, and its large changes.
 
     The test is the generalized likelihood ratio of one step over all its possible times. It is
-    repeated on the blocks before and after the step: of two changes, the later may be found first.
-    The scatter between blocks comes from successive blocks, so slow growth of friction widens it
-    little.
+    repeated on the blocks after the step, and before it for a large one: of two changes, the later
+    may be found first. Each large change is between the blocks since the one before and to the
+    next. The scatter between blocks comes from successive blocks, so slow growth of friction widens
+    it little.
     """
     count = series.friction.size
-    edges = [0, *_places(series, 0, count), count]
+    found = _steps(series, 0, count)
+    edges = [0, *(block for block, size in found if _is_large(size)), count]
     parts = zip(edges, edges[1:], edges[2:], strict=False)
-    return tuple(_split(_Part.of(series, begin, end), place) for begin, place, end in parts)
+    splits = (_split(_Part.of(series, begin, end), place) for begin, place, end in parts)
+    return (found[-1][0] if found else 0), tuple(splits)
 
 
-def _places(series: Series, begin: int, end: int) -> list[int]:
-    """Return the first block after each change between two blocks."""
+def _is_large(ratio: float) -> bool:
+    return abs(math.log(ratio)) >= math.log1p(DECLARED)
+
+
+def _steps(series: Series, begin: int, end: int) -> list[tuple[int, float]]:
+    """Return the first block after each step between two blocks, and its size as a ratio."""
     if end - begin < 2 * _LEAST_BLOCKS or not np.all(series.friction[begin:end] > 0):
         return []
-    place = _place(_Part.of(series, begin, end))
-    if place is None:
+    step = _step(_Part.of(series, begin, end))
+    if step is None:
         return []
-    if before := _places(series, begin, place):
-        return [*before, *_places(series, before[-1], end)]
-    return [place, *_places(series, place, end)]
+    if before := [one for one in _steps(series, begin, step[0]) if _is_large(one[1])]:
+        return [*before, *_steps(series, before[-1][0], end)]
+    return [step, *_steps(series, step[0], end)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,8 +209,8 @@ class _Part:
         return cls(series, begin, contrasts, old, new, np.abs(new - old) / errors)
 
 
-def _place(part: _Part) -> int | None:
-    """Return the first block after the step of a part, or None without a sure step."""
+def _step(part: _Part) -> tuple[int, float] | None:
+    """Return the first block after the step of a part, and its size; None without a sure step."""
     count = part.statistics.size + 1
     inner = slice(_LEAST_BLOCKS - 1, count - _LEAST_BLOCKS)
     likeliest = inner.start + int(np.argmax(part.statistics[inner]))
@@ -215,7 +222,7 @@ def _place(part: _Part) -> int | None:
     place = int(np.argmax(part.statistics)) + 1
     if place == count - 1:  # the last block may hold the change itself, or be an outlier
         return None
-    return part.begin + place
+    return part.begin + place, size
 
 
 def _split(part: _Part, block: int) -> Split:
@@ -405,7 +412,7 @@ def _since_change(
     series = series_of(every, travel)
     if series is None:
         return 0, ()
-    splits = splits_of(series)
+    start, splits = splits_of(series)
     begins = [0, *(split.block for split in splits), series.first.size]
     shifts = [_lag_share(series, every, *one) for one in pairwise(begins)]
     changes = tuple(
@@ -413,7 +420,7 @@ def _since_change(
         for split, (before, after) in zip(splits, pairwise(shifts), strict=True)
         if split.is_declared
     )
-    return (int(series.first[splits[-1].block]) if splits else 0), changes
+    return int(series.first[start]), changes
 
 
 def _lag_share(series: Series, every: Moves, begin: int, end: int) -> float:
