@@ -359,8 +359,9 @@ WEIGHTS = np.random.default_rng(1)
 @pytest.fixture(scope="module", params=[0.4, 3.0], ids=["one preload", "preloads by the hour"])
 def design(request):
     moves = Moves.of(made_moves(request.param, lambda hour: 300.0 + 20.0 * hour, noise=10.0))
-    scales = scales_of(moves)
-    plain = design_of(moves, blocks_of(moves), scales)
+    steps = levels_of(moves)
+    scales = scales_of(moves, steps[0])
+    plain = design_of(moves, blocks_of(moves), scales, steps)
     precision = priors(plain, scales, moves, VALVE.travel)
     return with_onsets(plain, moves, scales.place), precision
 
@@ -624,12 +625,14 @@ class TestChange:
             start, stop = place * VALVE.travel, (place + way * far) * VALVE.travel
             force = 2e5 * 0.5 * (start + stop) + 1e3 + process + 0.5 * step + way * 300.0
             end = time + 4_000_000_000
-            made.append(Move(time, end, start, stop, force + random.normal(0.0, 5.0), 0.0, 1e-3))
+            force, speed = force + random.normal(0.0, 5.0), 2e-2 if step else 1e-3
+            made.append(Move(time, end, start, stop, force, 0.0, speed))
             place, process, time = place + way * far, process + step, time + 60_000_000_000
         found = evidence_of(made, VALVE)
         assert found.changes == ()
         one = found.parameters["sliding_friction"]
         assert abs(one.value - 300.0) < one.half_width < 0.1 * 300.0
+        assert found.sliding_speed == pytest.approx(1e-3)  # the steps are not those of the loop
         for last in range(300, 1200, 50):
             assert evidence_of(made[:last], VALVE).changes == ()
 

@@ -216,8 +216,9 @@ class Normal(NamedTuple):
         return np.diag(1.0 / self.friction) + ratio.T @ solution(left, ratio)
 
 
-def scales_of(moves: Moves) -> Scales:
-    """Return the scales of moves."""
+def scales_of(moves: Moves, levels: NDArray[np.intp]) -> Scales:
+    """Return the scales of moves, given their levels of the preload (`levels_of`)."""
+    moves = moves[_is_steady(levels)]
     place, speed = (
         float(np.average(one, weights=moves.distance)) for one in (moves.place, moves.speed)
     )
@@ -226,6 +227,12 @@ def scales_of(moves: Moves) -> Scales:
     found = scipy.linalg.lstsq(rows * root[:, None], moves.force * root)[0]
     least = 1e-9 * (1.0 + float(np.max(np.abs(moves.force))))
     return Scales(max(abs(float(found[0])), least), place, speed)
+
+
+def _is_steady(levels: NDArray[np.intp]) -> NDArray[np.bool_]:
+    """Return whether the process force surely did not step during a move."""
+    steps = np.diff(levels) != 0
+    return np.asarray(~(np.append(False, steps) | np.append(steps, False)), dtype=np.bool_)
 
 
 def levels_of(moves: Moves) -> tuple[NDArray[np.intp], float]:
@@ -333,9 +340,17 @@ def _epochs_of(time: NDArray[np.float64], levels: NDArray[np.intp]) -> NDArray[n
     return np.asarray(number + (_MOST_EPOCHS + 1) * levels, dtype=np.intp)
 
 
-def design_of(moves: Moves, frictions: NDArray[np.intp], scales: Scales) -> Design:
-    """Return the rows of moves, with one friction per number in `frictions`."""
-    levels, largest_step = levels_of(moves)
+def design_of(
+    moves: Moves,
+    frictions: NDArray[np.intp],
+    scales: Scales,
+    steps: tuple[NDArray[np.intp], float],
+) -> Design:
+    """Return the rows of moves, with one friction per number in `frictions`.
+
+    `steps` are the levels of the preload, and the largest step between them (`levels_of`).
+    """
+    levels, largest_step = steps
     kinds, epochs = np.unique(_epochs_of(moves.time, levels), return_inverse=True)
     way, away = moves.direction, moves.place - scales.place
     dense = np.zeros((len(moves), PRELOAD + 1))
@@ -343,9 +358,7 @@ def design_of(moves: Moves, frictions: NDArray[np.intp], scales: Scales) -> Desi
     speed = scales.speed
     dense[:, SPEED] = way * (np.minimum(moves.speed, _FASTEST * speed) - speed)
     dense[:, ALONG] = way * away
-    weight = moves.distance / float(np.mean(moves.distance))
-    for beside in (0, 1):  # during one of these moves, or between them, the process force stepped
-        weight[np.flatnonzero(np.diff(levels)) + beside] = 0.0
+    weight = moves.distance / float(np.mean(moves.distance)) * _is_steady(levels)
     return Design(
         dense,
         epochs.astype(np.intp),
@@ -506,9 +519,10 @@ def balance_of(
     ways = [int(np.sum(moves.direction == way)) for way in (-1, 1)]
     if min(ways) < FEWEST_MOVES or count < FEWEST_BLOCKS:
         return None
-    scales = scales_of(moves)
+    steps = levels_of(moves)
+    scales = scales_of(moves, steps[0])
     scale, place, speed = scales
-    design = design_of(moves, np.zeros(len(moves), dtype=np.intp), scales)
+    design = design_of(moves, np.zeros(len(moves), dtype=np.intp), scales, steps)
     precision = priors(design, scales, moves, travel)
     precision[SLIDING] = 0.0
     design = with_onsets(design, moves, place)

@@ -35,6 +35,7 @@ from valve_friction_ros.evidence.balance import (
     balance_of,
     blocks_of,
     design_of,
+    levels_of,
     priors,
     robust,
     scales_of,
@@ -88,8 +89,9 @@ def series_of(moves: Moves, travel: float) -> Series | None:
     count = int(blocks[-1]) + 1 if len(moves) else 0
     if count < 2:
         return None
-    scales = scales_of(moves)
-    design = design_of(moves, blocks, scales)
+    steps = levels_of(moves)
+    scales = scales_of(moves, steps[0])
+    design = design_of(moves, blocks, scales, steps)
     precision = priors(design, scales, moves, travel)
     values, weight = robust(design, design.force, precision, scales.friction)
     covariance = design.normal(weight, precision).friction_covariance()
