@@ -52,9 +52,10 @@ MONTHS = ((2025, 7), (2025, 10), (2026, 1), (2026, 4), (2026, 7))
 QUARTERS = [datetime(year, month, 3, 8, tzinfo=timezone.utc) for year, month in MONTHS]
 
 
-def stroke(friction, seed):
-    """Twenty seconds of a sine at 100 Hz, pressure as gauge."""
+def stroke(friction, seed, share=1.0):
+    """Twenty seconds of a sine at 100 Hz, or a share of it; pressure as gauge."""
     pressure = SineWave(period=10.0).sample(np.arange(2000) / 100)
+    pressure = pressure.mean() + share * (pressure - pressure.mean())
     packing = replace(LOW_FRICTION, coulomb_friction=friction, static_friction=friction)
     stem = simulate(BENCH_VALVE, packing, pressure, 0.01).position
     noisy = SensorNoise(2e-6, 20.0, seed=seed).applied_to(Recording(0.01, pressure, stem))
@@ -455,6 +456,25 @@ class TestTable:
 )
 def test_tags(text, found):
     assert tags_in([text], ["FV-101", "FV-101A", "FV-10"]) == found
+
+
+def test_lost_travel_stays_an_alarm_until_a_record_reaches_the_stop_again(tmp_path):
+    """Nothing is repaired by a partial stroke that does not get that far."""
+    pressure, position = stroke(150.0, 1)
+    short = np.minimum(position, 0.6 * BENCH_VALVE.travel)
+    records = (pressure, position), (pressure, short), stroke(150.0, 2, 0.2), (pressure, position)
+    states = []
+    for number, record in enumerate(records):
+        make_plant(tmp_path, {f"FV-101 {number}.csv": german(QUARTERS[number], *record)})
+        history = tmp_path / "history.sqlite"
+        identify(tmp_path, "--history", history, "--first-is-baseline", *BERLIN)
+        alarm = read_alarms(HistoryFile(history), kept_valve("FV-101").name).get(
+            AlarmKind.WHOLE_VALVE
+        )
+        states.append("" if alarm is None else f"{alarm.state.value} {alarm.condition.level.name}")
+        if number in (1, 2):
+            assert "travel" in alarm.condition.message
+    assert states == ["", *2 * ["unacknowledged WARN"], "returned unacknowledged OK"]
 
 
 class TestSeizedStem:

@@ -233,6 +233,21 @@ class TestReference:
         assert small.change is not None
         assert self.found(small, reference=None) is None
 
+    @pytest.mark.parametrize(
+        ("second", "third", "level"), [(150.0, 300.0, Level.OK), (360.0, 440.0, Level.WARN)]
+    )
+    def test_changes_are_judged_together(self, second, third, level):
+        """A packing adjusted after a fall is healthy; twice a fifth more is an alarm."""
+
+        def friction(hour):
+            return 300.0 if hour < 3 else second if hour < 6 else third
+
+        now = evidence(friction, hours=9.0)
+        assert len(now.changes) == 2
+        found = self.found(now, reference=None)
+        assert found.level is level
+        assert found.ratio.low <= third / 300.0 <= found.ratio.high
+
     def test_one_that_is_first_known_after_a_change_is_that_of_before(self):
         grown = evidence(changing_at(2.0), hours=4.0)
         late = reference_by_evidence(grown)

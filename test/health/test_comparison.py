@@ -197,6 +197,23 @@ class TestCarried:
         assert (self.carried(8e-3, to, viscous=None) is not None) is is_near
         assert self.carried(8e-3, to) is not None
 
+    @pytest.mark.parametrize("is_weak", [True, False])
+    def test_no_packing_has_surely_changed_however_far_the_speeds(self, is_weak):
+        """An unchanged packing at two speeds, 30 and more apart; F_v unknown, or from its creep."""
+        random = np.random.default_rng(11)
+        for _ in range(1000):
+            static, fall = random.uniform(1.0, 1.45), 0.3e-3 * (5.0 / 0.3) ** random.random()
+            fast = 10 ** random.uniform(-3.0, -1.7)
+            law = law_of(static, fall, random.uniform(0.05, 3.0) / fast)
+            slow = fast / random.uniform(30.0, 100.0)
+            speeds = [slow, fast] if is_weak else random.permutation([slow, fast])
+            creep = 0.07 * law(slow) / slow, 0.04 * law(slow) / slow
+            now = frictions(sliding=(law(speeds[0]), 0.0), viscous=creep if is_weak else None)
+            weak = replace(now["viscous_friction"], verdict=Verdict.WEAK)
+            baseline = Baseline(sliding=SlidingFriction(law(speeds[1]), 0.0, speeds[1]))
+            found = compared(now | {"viscous_friction": weak}, speeds[0], baseline)
+            assert found is None or found.ratio.change == 0.0
+
     def test_not_without_a_friction_or_a_speed(self):
         assert self.carried(SPEED, SPEED, sliding=None) is None
         assert self.carried(math.nan, SPEED) is None

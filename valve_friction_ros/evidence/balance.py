@@ -68,8 +68,8 @@ _SPEED, _ALONG, _DRIFT = 1.0, 0.5, 0.2
 """Standard deviations, as shares of the sliding friction: of its change with speed, at the mean
 speed; of its change along the travel; and of the preload from hour to hour."""
 
-_SIDE, _LEAST_OF_A_SIDE, _SEARCHED = 12, 3, 6
-"""Moves compared on either side of a step of the preload; their least number in each direction; and
+_SIDE, _LEAST_OF_A_SIDE, _SEARCHED = 6, 3, 6
+"""Moves of each direction compared on either side of a step of the preload; their least number; and
 moves to either side within which the step is then located."""
 
 _STEP_ERRORS, _STEP_SHARE, _MOST_STEPS = 6.0, 0.25, 120
@@ -216,8 +216,9 @@ class Normal(NamedTuple):
         return np.diag(1.0 / self.friction) + ratio.T @ solution(left, ratio)
 
 
-def scales_of(moves: Moves) -> Scales:
-    """Return the scales of moves."""
+def scales_of(moves: Moves, levels: NDArray[np.intp]) -> Scales:
+    """Return the scales of moves, given their levels of the preload (`levels_of`)."""
+    moves = moves[_is_steady(levels)]
     place, speed = (
         float(np.average(one, weights=moves.distance)) for one in (moves.place, moves.speed)
     )
@@ -226,6 +227,12 @@ def scales_of(moves: Moves) -> Scales:
     found = scipy.linalg.lstsq(rows * root[:, None], moves.force * root)[0]
     least = 1e-9 * (1.0 + float(np.max(np.abs(moves.force))))
     return Scales(max(abs(float(found[0])), least), place, speed)
+
+
+def _is_steady(levels: NDArray[np.intp]) -> NDArray[np.bool_]:
+    """Return whether the process force surely did not step during a move."""
+    steps = np.diff(levels) != 0
+    return np.asarray(~(np.append(False, steps) | np.append(steps, False)), dtype=np.bool_)
 
 
 def levels_of(moves: Moves) -> tuple[NDArray[np.intp], float]:
@@ -241,26 +248,45 @@ def levels_of(moves: Moves) -> tuple[NDArray[np.intp], float]:
         return number, 0.0
     left, friction = _without_spring(moves)
     error = float(np.median(np.abs(np.diff(left)))) / (MEDIAN_MAGNITUDE * math.sqrt(2.0))
-    sides = np.array([_medians(np.where(way == sign, left, np.nan)) for sign in (1.0, -1.0)])
-    median, known = sides[:, 0], sides[:, 1]
-    steps = 0.5 * (median[:, 1] - median[:, 0]).sum(axis=0)
-    with np.errstate(divide="ignore"):
-        errors = error * np.sqrt(0.25 * 0.5 * math.pi * (1.0 / known).sum(axis=(0, 1)))
-    enough = known.min(axis=(0, 1)) >= _LEAST_OF_A_SIDE
-    over = np.abs(steps) / np.maximum(_STEP_ERRORS * errors, _STEP_SHARE * friction)
-    over = np.where(enough, over, 0.0)
+    free = np.ones(count, dtype=np.bool_)
     largest = 0.0
     for _ in range(_MOST_STEPS):
-        place = int(np.argmax(over))
-        if over[place] <= 1.0:
+        median, known = _beside(left, way)
+        steps = 0.5 * (median[:, 1] - median[:, 0]).sum(axis=0)
+        with np.errstate(divide="ignore"):
+            errors = error * np.sqrt(0.25 * 0.5 * math.pi * (1.0 / known).sum(axis=(0, 1)))
+        enough = free & (known.min(axis=(0, 1)) >= _LEAST_OF_A_SIDE)
+        over = np.abs(steps) / np.maximum(_STEP_ERRORS * errors, _STEP_SHARE * friction)
+        place = int(np.argmax(np.where(enough, over, 0.0)))
+        if not (enough[place] and over[place] > 1.0):
             break
         near = slice(max(place - _SEARCHED, 0), place + _SEARCHED)
         before, after = (np.where(way[near] > 0, *median[:, side, place]) for side in (0, 1))
         gain = np.abs(left[near] - before) - np.abs(left[near] - after)
-        number[near.start + int(np.argmin(np.concatenate(([0.0], np.cumsum(gain))))) :] += 1
+        begin = near.start + int(np.argmin(np.concatenate(([0.0], np.cumsum(gain)))))
+        number[begin:] += 1
+        left[begin:] -= steps[place]
         largest = max(largest, abs(float(steps[place])))
-        over[near] = 0.0
+        free[near] = False
     return number, largest
+
+
+def _beside(
+    values: NDArray[np.float64], way: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the medians of the moves in each direction before and from each place on.
+
+    Also returns the numbers of these moves, at most `_SIDE`. Shapes are (2, 2, n): direction, side,
+    place. After a step of the process force, a loop brings the stem back by moves in one direction;
+    the last moves in the other direction are farther away.
+    """
+    found = []
+    for sign in (1.0, -1.0):
+        of_way = way == sign
+        passed = np.cumsum(of_way) - of_way
+        found.append(_medians(np.append(values[of_way], np.nan))[:, :, passed])
+    both = np.array(found)
+    return both[:, 0], both[:, 1]
 
 
 def _without_spring(moves: Moves) -> tuple[NDArray[np.float64], float]:
@@ -298,26 +324,48 @@ def _medians(values: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.stack((found[:, : values.size], found[:, _SIDE : _SIDE + values.size]), axis=1)
 
 
-def design_of(moves: Moves, frictions: NDArray[np.intp], scales: Scales) -> Design:
-    """Return the rows of moves, with one friction per number in `frictions`."""
-    passed = moves.time - moves.time[0]
-    epoch = max(_EPOCH, float(passed[-1]) / (_MOST_EPOCHS - 1))
-    levels, largest_step = levels_of(moves)
-    numbers = (passed / epoch).astype(np.intp) + (_MOST_EPOCHS + 1) * levels
-    kinds, epochs = np.unique(numbers, return_inverse=True)
+def _epochs_of(time: NDArray[np.float64], levels: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Return a number for each move, alike for moves with the same preload.
+
+    Epochs begin anew at each step of the preload, and the rest of the last one belongs to the epoch
+    before it. After a step, no earlier epoch tells the preload, and the first moves may all have
+    one direction, which does not tell preload and friction apart.
+    """
+    epoch = max(_EPOCH, float(time[-1] - time[0]) / (_MOST_EPOCHS - 1))
+    begin, end = (np.searchsorted(levels, levels, side) for side in ("left", "right"))
+    number = ((time - time[begin]) / epoch).astype(np.intp)
+    if levels[-1]:
+        last = ((time[end - 1] - time[begin]) / epoch).astype(np.intp) - 1
+        number = np.minimum(number, np.maximum(last, 0))
+    return np.asarray(number + (_MOST_EPOCHS + 1) * levels, dtype=np.intp)
+
+
+def design_of(
+    moves: Moves,
+    frictions: NDArray[np.intp],
+    scales: Scales,
+    steps: tuple[NDArray[np.intp], float],
+) -> Design:
+    """Return the rows of moves, with one friction per number in `frictions`.
+
+    `steps` are the levels of the preload, and the largest step between them (`levels_of`).
+    """
+    levels, largest_step = steps
+    kinds, epochs = np.unique(_epochs_of(moves.time, levels), return_inverse=True)
     way, away = moves.direction, moves.place - scales.place
     dense = np.zeros((len(moves), PRELOAD + 1))
     dense[:, SPRING], dense[:, PRELOAD] = away, 1.0
     speed = scales.speed
     dense[:, SPEED] = way * (np.minimum(moves.speed, _FASTEST * speed) - speed)
     dense[:, ALONG] = way * away
+    weight = moves.distance / float(np.mean(moves.distance)) * _is_steady(levels)
     return Design(
         dense,
         epochs.astype(np.intp),
         frictions,
         way,
         moves.force,
-        moves.distance / float(np.mean(moves.distance)),
+        weight,
         moves.force_rate,
         kinds.size if kinds.size > 1 else 0,
         int(frictions.max()) + 1,
@@ -339,7 +387,7 @@ def with_onsets(design: Design, moves: Moves, place: float) -> Design:
         group=np.concatenate((design.group, design.group[begun])),
         way=np.concatenate((design.way, np.zeros(way.size))),
         force=np.concatenate((design.force, moves.onset_force[begun])),
-        weight=np.concatenate((design.weight, np.full(way.size, _ONSET))),
+        weight=np.concatenate((design.weight, _ONSET * (design.weight[begun] > 0))),
         rate=np.concatenate((design.rate, moves.onset_rate[begun])),
     )
 
@@ -471,9 +519,10 @@ def balance_of(
     ways = [int(np.sum(moves.direction == way)) for way in (-1, 1)]
     if min(ways) < FEWEST_MOVES or count < FEWEST_BLOCKS:
         return None
-    scales = scales_of(moves)
+    steps = levels_of(moves)
+    scales = scales_of(moves, steps[0])
     scale, place, speed = scales
-    design = design_of(moves, np.zeros(len(moves), dtype=np.intp), scales)
+    design = design_of(moves, np.zeros(len(moves), dtype=np.intp), scales, steps)
     precision = priors(design, scales, moves, travel)
     precision[SLIDING] = 0.0
     design = with_onsets(design, moves, place)

@@ -35,6 +35,7 @@ from valve_friction_ros.evidence.balance import (
     balance_of,
     blocks_of,
     design_of,
+    levels_of,
     priors,
     robust,
     scales_of,
@@ -88,8 +89,9 @@ def series_of(moves: Moves, travel: float) -> Series | None:
     count = int(blocks[-1]) + 1 if len(moves) else 0
     if count < 2:
         return None
-    scales = scales_of(moves)
-    design = design_of(moves, blocks, scales)
+    steps = levels_of(moves)
+    scales = scales_of(moves, steps[0])
+    design = design_of(moves, blocks, scales, steps)
     precision = priors(design, scales, moves, travel)
     values, weight = robust(design, design.force, precision, scales.friction)
     covariance = design.normal(weight, precision).friction_covariance()
@@ -147,58 +149,101 @@ class Split(NamedTuple):
 
     @property
     def is_declared(self) -> bool:
-        """Whether it is large enough to be declared."""
-        return abs(math.log(self.size)) >= math.log1p(DECLARED)
+        """Whether it is large enough to be declared, with and without the blocks beside it."""
+        return _is_large(self.size) and _is_large(self.ratio)
 
 
-def last_splits(series: Series) -> tuple[Split, ...]:
-    """Return the changes of a series, each found in the blocks after the previous change.
+def splits_of(series: Series) -> tuple[int, tuple[Split, ...]]:
+    """Return the first block after the last change of a series, and its large changes.
 
     The test is the generalized likelihood ratio of one step over all its possible times. It is
-    repeated on the blocks after the step. The scatter between blocks comes from successive blocks,
-    so slow growth of friction widens it little.
+    repeated on the blocks after the step, and before it for a large one: of two changes, the later
+    may be found first. Each large change is between the blocks since the one before and to the
+    next. The scatter between blocks comes from successive blocks, so slow growth of friction widens
+    it little.
     """
-    found: list[Split] = []
-    begin = 0
-    while True:
-        split = _split(series, begin)
-        if split is None:
-            return tuple(found)
-        found.append(split)
-        begin = split.block
+    count = series.friction.size
+    found = _steps(series, 0, count)
+    edges = [0, *(block for block, size in found if _is_large(size)), count]
+    parts = zip(edges, edges[1:], edges[2:], strict=False)
+    splits = (_split(_Part.of(series, begin, end), place) for begin, place, end in parts)
+    return (found[-1][0] if found else 0), tuple(splits)
 
 
-def _split(series: Series, begin: int) -> Split | None:
-    friction, covariance = series.friction[begin:], series.covariance[begin:, begin:]
-    count = friction.size
-    if count < 2 * _LEAST_BLOCKS or not np.all(friction > 0):
-        return None
-    contrasts = _Contrasts(friction, covariance, _between(friction))
-    places = np.arange(1, count)
-    old, new, errors = contrasts.between(places, places)
-    statistics = np.abs(new - old) / errors
+def _is_large(ratio: float) -> bool:
+    return abs(math.log(ratio)) >= math.log1p(DECLARED)
+
+
+def _steps(series: Series, begin: int, end: int) -> list[tuple[int, float]]:
+    """Return the first block after each step between two blocks, and its size as a ratio."""
+    if end - begin < 2 * _LEAST_BLOCKS or not np.all(series.friction[begin:end] > 0):
+        return []
+    step = _step(_Part.of(series, begin, end))
+    if step is None:
+        return []
+    if before := [one for one in _steps(series, begin, step[0]) if _is_large(one[1])]:
+        return [*before, *_steps(series, before[-1][0], end)]
+    return [step, *_steps(series, step[0], end)]
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """Some blocks of a series, from `begin` on, and a step of friction at each place in them.
+
+    `old` and `new` are the means before and from each place on, N; `statistics` are their distances
+    in standard errors. The places are 1, 2, …
+    """
+
+    series: Series
+    begin: int
+    contrasts: "_Contrasts"
+    old: NDArray[np.float64]
+    new: NDArray[np.float64]
+    statistics: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, series: Series, begin: int, end: int) -> "_Part":
+        """Return the blocks from `begin` up to `end`."""
+        friction, covariance = series.friction[begin:end], series.covariance[begin:end, begin:end]
+        contrasts = _Contrasts(friction, covariance, _between(friction))
+        places = np.arange(1, friction.size)
+        old, new, errors = contrasts.between(places, places)
+        return cls(series, begin, contrasts, old, new, np.abs(new - old) / errors)
+
+
+def _step(part: _Part) -> tuple[int, float] | None:
+    """Return the first block after the step of a part, and its size; None without a sure step."""
+    count = part.statistics.size + 1
     inner = slice(_LEAST_BLOCKS - 1, count - _LEAST_BLOCKS)
-    likeliest = inner.start + int(np.argmax(statistics[inner]))
-    size = float(new[likeliest] / old[likeliest])
+    likeliest = inner.start + int(np.argmax(part.statistics[inner]))
+    size = float(part.new[likeliest] / part.old[likeliest])
     # Few blocks need more: their scatter may be small by chance.
     sure = _SURE_ERRORS * math.sqrt(1.0 + 4.0 / count)
-    if statistics[likeliest] < sure or max(size, 1.0 / size) < 1.0 + _RESET_THRESHOLD:
+    if part.statistics[likeliest] < sure or max(size, 1.0 / size) < 1.0 + _RESET_THRESHOLD:
         return None
-    best = int(np.argmax(statistics))
-    place = int(places[best])
+    place = int(np.argmax(part.statistics)) + 1
     if place == count - 1:  # the last block may hold the change itself, or be an outlier
         return None
-    possible = places[statistics**2 >= statistics[best] ** 2 - _DATE] + begin
+    return part.begin + place, size
+
+
+def _split(part: _Part, block: int) -> Split:
+    """Return the step of a part at a block, with its ratio and its possible dates."""
+    series, begin, statistics = part.series, part.begin, part.statistics
+    best = block - begin - 1
+    (possible,) = np.nonzero(statistics**2 >= statistics[best] ** 2 - _DATE)
+    first, last = int(possible[0]) + begin, int(possible[-1]) + begin + 1
     # The change lies within a block next to the place, so the ratio uses neither of the two.
-    beside = np.array([place])
-    found = contrasts.between(np.maximum(beside - 1, 1), beside + 1)
+    count = statistics.size + 1
+    ends, begins = (np.array([min(max(best + one, 1), count - 1)]) for one in (0, 2))
+    found = part.contrasts.between(ends, begins)
     before, after, error = (float(one[0]) for one in found)
     ratio, share = after / before, 2.0 * error / min(before, after)
     return Split(
-        block=begin + place,
-        earliest=float(series.begin[max(int(possible[0]) - 1, 0)]),
-        latest=float(series.end[min(int(possible[-1]), series.end.size - 1)]),
-        size=size,
+        block=block,
+        earliest=float(series.begin[first]),
+        latest=float(series.end[min(last, series.end.size - 1)]),
+        size=float(part.new[best] / part.old[best]),
         ratio=ratio,
         low=ratio * math.exp(-share),
         high=ratio * math.exp(share),
@@ -369,7 +414,7 @@ def _since_change(
     series = series_of(every, travel)
     if series is None:
         return 0, ()
-    splits = last_splits(series)
+    start, splits = splits_of(series)
     begins = [0, *(split.block for split in splits), series.first.size]
     shifts = [_lag_share(series, every, *one) for one in pairwise(begins)]
     changes = tuple(
@@ -377,7 +422,7 @@ def _since_change(
         for split, (before, after) in zip(splits, pairwise(shifts), strict=True)
         if split.is_declared
     )
-    return (int(series.first[splits[-1].block]) if splits else 0), changes
+    return int(series.first[start]), changes
 
 
 def _lag_share(series: Series, every: Moves, begin: int, end: int) -> float:

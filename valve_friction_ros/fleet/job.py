@@ -34,7 +34,6 @@ from valve_friction_ros.health import (
     AlarmKind,
     Baseline,
     Diagnosis,
-    Finding,
     FrictionHold,
     FrictionLimits,
 )
@@ -148,20 +147,22 @@ def filed_before(place: Path, tags: Iterable[str]) -> set[tuple[str, int]]:
 class _Alarms:
     """Updates the alarms of a valve from its filed records, each at the end of the record.
 
-    A record older than the last filed record does not change the alarms.
+    A record older than the last filed record does not change the alarms. A number that a record
+    does not show keeps its earlier value: nothing was repaired.
     """
 
     def __init__(self, history: HistoryFile, valve: KeptValve) -> None:
         self._history, self._valve = history, valve
         alarms = read_alarms(history, valve.name)
+        self._whole = alarms.get(AlarmKind.WHOLE_VALVE, Alarm(AlarmKind.WHOLE_VALVE)).condition
         last = history.last_success(valve.name)
         shown = {
             side: alarms.get(kind, Alarm(kind)).condition for side, kind in ALARM_OF_SIDE.items()
         }
         self._hold = FrictionHold(shown, None if last is None else last.time)
 
-    def follow(self, diagnosis: Diagnosis, findings: Iterable[Finding], filing: Filing) -> None:
-        """Take the diagnosis of a record, dated at the end of the record."""
+    def follow(self, diagnosis: Diagnosis, filing: Filing) -> None:
+        """Take the diagnosis of a filed record, dated at the end of the record."""
         time = filing.span.end
         if self._hold.until is not None and time <= self._hold.until:
             return
@@ -172,9 +173,22 @@ class _Alarms:
             conditions = {} if diagnosis.level is Level.OK else {AlarmKind.STUCK: held}
         else:
             conditions = {kind: self._hold.conditions[side] for side, kind in ALARM_OF_SIDE.items()}
-            conditions[AlarmKind.WHOLE_VALVE] = shown_by(findings)
+            conditions[AlarmKind.WHOLE_VALVE] = self._whole_valve(filing)
             conditions[AlarmKind.STUCK] = NO_CONDITION
         follow_alarms(self._history, self._valve, conditions, time)
+
+    def _whole_valve(self, filing: Filing) -> Condition:
+        """Return the condition beyond friction; it falls only if nothing can have changed."""
+        kept = self._history.baseline(self._valve.name)
+        if kept is None:
+            return NO_CONDITION
+        valve, limits, baseline = filing.settings.valve, filing.settings.valve_limits, kept.baseline
+        since = min(kept.since, filing.span.end)
+        known = self._history.known_numbers(self._valve.name, valve, since)
+        worst = shown_by(known.findings(baseline, valve, limits))
+        if worst.level >= self._whole.level or not known.may_differ(baseline, valve, limits):
+            self._whole = worst
+        return self._whole
 
 
 def baseline_kept(place: Path | None, tag: str) -> Baseline | None:
@@ -247,7 +261,7 @@ def file_results(place: Path, filings: Iterable[Filing], first_is_baseline: bool
                 **kept_of(one.outcome, numbers),
             )
         )
-        alarms[one.tag].follow(diagnosis, findings, one)
+        alarms[one.tag].follow(diagnosis, one)
     return Filed(len(ordered) - known, known, tuple(begun), cells)
 
 

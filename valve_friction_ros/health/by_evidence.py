@@ -11,9 +11,10 @@
 
 import contextlib
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
-from valve_friction_ros.evidence import Evidence
+from valve_friction_ros.evidence import Evidence, FrictionChange
 from valve_friction_ros.health.baseline import (
     GOOD_SHARE,
     Baseline,
@@ -93,11 +94,17 @@ def reference_by_evidence(evidence: Evidence) -> Reference | None:
             return None
         if not changes:
             return Reference(sliding, evidence.until)
-        value = sliding.value / math.prod(one.ratio for one in changes)
-        shares = (0.5 * math.log(one.high / one.low) for one in changes)
-        width = value * math.hypot(sliding.half_width / sliding.value, *shares)
+        ratio, share = _overall(changes)
+        value = sliding.value / ratio
+        width = value * math.hypot(sliding.half_width / sliding.value, share)
         return Reference(SlidingFriction(value, width, sliding.speed), changes[0].earliest)
     return None
+
+
+def _overall(changes: Sequence[FrictionChange]) -> tuple[float, float]:
+    """Return the ratio over all changes, and half the width of the interval of its logarithm."""
+    shares = (0.5 * math.log(one.high / one.low) for one in changes)
+    return math.prod(one.ratio for one in changes), math.hypot(*shares)
 
 
 def diagnosis_by_evidence(
@@ -122,7 +129,7 @@ def diagnosis_by_evidence(
     reference : Reference, optional
         Friction of the first combined moves, for a valve without a comparable baseline
         (`why_not_compared`). If the reference is not comparable either, for example because a stem
-        that sticks more moves at other speeds, a declared change raises an alarm by itself.
+        that sticks more moves at other speeds, the declared changes raise an alarm by themselves.
 
     Returns
     -------
@@ -142,7 +149,7 @@ def diagnosis_by_evidence(
     if reference is not None:
         found = _compared(evidence, Baseline(sliding=reference.sliding))
     if reference is None or found is None:
-        return _by_change(evidence, limits, effect)
+        return _by_changes(evidence, limits, effect, alone=baseline is None and reference is None)
     has_baseline = baseline is not None
     healthy = said(Code.FIRST_MOVES, time=reference.time, has_baseline=has_baseline)
     return against(found, limits, _dated(effect, evidence), healthy)
@@ -156,16 +163,25 @@ def _dated(effect: Statement, evidence: Evidence) -> Statement:
     return said(Code.CHANGED, of=effect, earliest=change.earliest, latest=change.latest)
 
 
-def _by_change(evidence: Evidence, limits: FrictionLimits, effect: Statement) -> Diagnosis | None:
-    """Judge a declared change by itself; return None unless it is an alarm."""
-    change = evidence.change
-    if change is None:
+def _by_changes(
+    evidence: Evidence, limits: FrictionLimits, effect: Statement, alone: bool
+) -> Diagnosis | None:
+    """Judge the declared changes by themselves; return None unless they are an alarm.
+
+    Friction is compared with its value before the first change: a second one may undo it. That is
+    reported if the changes stand `alone`, so that nothing else can have raised the alarm it ends.
+    """
+    changes = evidence.changes
+    if not changes:
         return None
-    ends = change.ratio, change.low, change.high
+    value, share = _overall(changes)
+    ends = value, value * math.exp(-share), value * math.exp(share)
     ratio = Ratio.between(*ends, of=SLIDING, speed=evidence.sliding_speed)
-    healthy = said(Code.BEFORE_CHANGE, earliest=change.earliest, latest=change.latest)
+    first = changes[0]
+    healthy = said(Code.BEFORE_CHANGE, earliest=first.earliest, latest=first.latest)
     found = against(ratio, limits, effect, healthy)
-    return found if found.state.side is not None else None
+    is_undone = alone and len(changes) > 1
+    return found if is_undone or found.state.side is not None else None
 
 
 def _compared(evidence: Evidence, baseline: Baseline) -> Ratio | None:

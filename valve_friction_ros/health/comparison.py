@@ -144,7 +144,7 @@ def carried(
     speed: float,
     to: SlidingFriction,
     numbers: Mapping[str, Measured] = _NOTHING,
-    widest: float = _WIDEST_STEP,
+    far: bool = False,
 ) -> SlidingFriction | None:
     """Carry the sliding friction of a result to the speed of another.
 
@@ -154,7 +154,8 @@ def carried(
     exponent (`_USUAL_EXPONENT`). The interval widens with the distance of the speeds.
 
     Returns None where no sliding friction is above zero, or the speeds are too far apart: the
-    half width of the step, as a logarithm, exceeds `widest`.
+    half width of the step, as a logarithm, exceeds `_WIDEST_STEP`. If `far`, the interval then
+    includes all that the speeds may explain (`_farthest_step`).
     """
     sliding = parameters.get(SLIDING)
     if sliding is None or not (sliding.value > 0 and sliding.half_width >= 0 and speed > 0):
@@ -164,8 +165,10 @@ def carried(
         return SlidingFriction(sliding.value, sliding.half_width, speed)
     shares = _viscous_shares(parameters.get("viscous_friction"), sliding.value / speed)
     step, doubt = _step(math.log(to.speed / speed), shares, numbers.get(SPEED_EXPONENT))
-    if doubt > widest:
-        return None
+    if doubt > _WIDEST_STEP:
+        if not far:
+            return None
+        step, doubt = _farthest_step(math.log(to.speed / speed), parameters, sliding.value / speed)
     value = sliding.value * math.exp(step)
     share = math.hypot(sliding.half_width / sliding.value, doubt)
     return SlidingFriction(value, share * value, to.speed)
@@ -201,6 +204,25 @@ def _step(
     weight = (spread / both) ** 2
     mean = weight * found + (1.0 - weight) * _USUAL_EXPONENT * apart
     return mean, doubt * spread / both
+
+
+def _farthest_step(
+    apart: float, parameters: Mapping[str, Parameter], largest: float
+) -> tuple[float, float]:
+    """Return the change of the logarithm of friction over any change of ln v, between its bounds.
+
+    Nothing usual narrows them, and F_v only where it is identified: a weak one holds for the speeds
+    of its record, whose lag or creep it may be.
+    """
+    viscous = parameters.get("viscous_friction")
+    if viscous is not None and viscous.without_calibration.verdict is not Verdict.IDENTIFIED:
+        viscous = None
+    low, high = sorted(
+        math.log1p(share * math.expm1(apart)) for share in _viscous_shares(viscous, largest)
+    )
+    fall, spread = math.copysign(_USUAL_FALL, apart), NORMAL_QUANTILE * _FALL_SPREAD
+    stretch = -math.expm1(-abs(apart))
+    return 0.5 * (low + high) - fall * stretch, 0.5 * (high - low) + spread * stretch
 
 
 def compared(
@@ -245,7 +267,7 @@ def compared(
     if baseline.sliding is not None:
         healthy = baseline.sliding
         known = carried(parameters, speed, healthy, numbers)
-        now = known or carried(parameters, speed, healthy, numbers, math.inf)
+        now = known or carried(parameters, speed, healthy, numbers, far=True)
         if now is not None:
             shared, healthy_shared = _shared(numbers, baseline.numbers, speed / healthy.speed)
             by_sliding = Comparison(

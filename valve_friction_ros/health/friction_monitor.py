@@ -13,7 +13,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
-from valve_friction_ros.health.alarm_conditions import farthest
 from valve_friction_ros.health.baseline import Baseline, BaselineLack, Lack
 from valve_friction_ros.health.diagnosis import (
     Diagnosis,
@@ -32,7 +31,6 @@ from valve_friction_ros.health.valve_diagnosis import (
     KnownNumbers,
     ValveDiagnosis,
     ValveLimits,
-    diagnose_numbers,
     diagnose_valve,
     qualified,
 )
@@ -332,15 +330,11 @@ class FrictionMonitor:
         return held_finding(self.known.of_latest, baseline, settings.valve, settings.limits)
 
     def may_have_changed(self) -> bool:
-        """Return whether the far ends of the intervals show a change beside friction.
-
-        An alarm on the whole valve clears only once they show none.
-        """
+        """Return whether something beside friction may have changed (`KnownNumbers.may_differ`)."""
         baseline, settings = self.baseline, self.settings
         if baseline is None or not baseline.numbers:
             return False
-        numbers = farthest(self.known.numbers, baseline.numbers)
-        return bool(diagnose_numbers(numbers, baseline, settings.valve, settings.valve_limits))
+        return self.known.may_differ(baseline, settings.valve, settings.valve_limits)
 
     @property
     def common_factor(self) -> Measured | None:

@@ -14,6 +14,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
 from typing import NamedTuple
 
+from valve_friction_ros.health.alarm_conditions import farthest
 from valve_friction_ros.health.baseline import Baseline
 from valve_friction_ros.health.diagnosis import Diagnosis, FrictionLimits, diagnose
 from valve_friction_ros.health.levels import Finding, Level, StatusSignal
@@ -553,6 +554,16 @@ class KnownNumbers:
             return ()
         found = diagnose_numbers(self.numbers, baseline, valve, limits)
         return tuple(map(self._with_date, found))
+
+    def may_differ(
+        self, baseline: Baseline, valve: Valve, limits: ValveLimits | None = None
+    ) -> bool:
+        """Return whether the far ends of the intervals show a change (`farthest`).
+
+        An alarm on the whole valve clears only once they show none.
+        """
+        numbers = farthest(self.numbers, baseline.numbers)
+        return bool(diagnose_numbers(numbers, baseline, valve, limits))
 
     def _with_date(self, finding: Finding) -> Finding:
         times = {self.dated[name].time for name in finding.numbers if name in self.dated}
