@@ -70,6 +70,7 @@ declared = {}
 node = SimpleNamespace(
     add_on_set_parameters_callback=id,
     add_pre_set_parameters_callback=id,
+    add_post_set_parameters_callback=id,
     declare_parameter=lambda name, *rest: declared.update({name: rest}),
 )
 declare_parameters(node, settings.NODES["identifier"])
