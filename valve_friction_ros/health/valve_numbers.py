@@ -262,7 +262,7 @@ _SLIP_SHARE = 0.5
 
 Chosen: on simulated valves whose friction falls with speed, 0.4 to 1 of F_s − F_c was found."""
 
-_SURE_SPRING = 0.1
+SURE_SPRING = 0.1
 """Largest relative half width of the spring constant at which the numbers of a fit are used.
 
 Chosen. Above it, the record does not separate spring from friction, and all numbers of the fit
@@ -319,7 +319,7 @@ def fit_numbers(known: Mapping[str, Measured]) -> dict[str, Measured]:
     The result is empty where the spring constant is not known well enough.
     """
     spring = known.get("spring_constant")
-    if spring is None or spring.share > _SURE_SPRING:
+    if spring is None or spring.share > SURE_SPRING:
         return {}
     numbers = {name: known[name] for name in COMPARED if name in known}
     if {"static_friction", "coulomb_friction"} <= known.keys():
