@@ -288,8 +288,8 @@ def valve_numbers(result: Result) -> dict[str, Measured]:
     fit = fit_numbers(known)
     if fit:
         fit |= _imperfections(result.evidence, known)
-    for name in IDENTIFIED_ONLY:
-        if result.parameters[name].without_calibration.verdict is not Verdict.IDENTIFIED:
+    if result.parameters["viscous_friction"].without_calibration.verdict is not Verdict.IDENTIFIED:
+        for name in (*IDENTIFIED_ONLY, "viscous_asymmetry"):  # a share of F_v is known no better
             fit.pop(name, None)
     if result.misfit is not None and not result.misfit.describes:
         balance = {n: result.parameters[n] for n in _OF_THE_BALANCE if n in result.parameters}
