@@ -166,6 +166,17 @@ class TestCarried:
         assert found == self.carried(8e-3, 4e-3, viscous=(500.0, 900.0))
         assert found.half_width < 0.6 * self.carried(8e-3, 4e-3, viscous=None).half_width
 
+    @pytest.mark.parametrize(("share", "counts"), [(0.09, True), (0.14, False)])
+    def test_the_viscous_friction_of_a_vague_spring_does_not_count(self, share, counts):
+        """A fit that does not separate spring from friction does not tell F_v, however narrow."""
+        known = frictions(sliding=(200.0, 3.0), viscous=(SLOPE, 1000.0), verdict=Verdict.WEAK)
+        spring = parameter("spring_constant", 1e5, share * 1e5, Verdict.WEAK)
+        to = SlidingFriction(1.0, 0.0, 6e-3)
+        found = carried(known | {"spring_constant": spring}, 8e-3, to)
+        assert found == self.carried(8e-3, 6e-3, viscous=(SLOPE, 1000.0) if counts else None)
+        fixed = replace(spring, verdict=Verdict.FIXED)
+        assert carried(known | {"spring_constant": fixed}, 8e-3, to).half_width < 20.0
+
     @pytest.mark.parametrize("width", [0.0, 0.1, 0.3, None])
     @pytest.mark.parametrize("farthest", [1.5, 2.5, 8.0])
     def test_95_percent_of_drawn_packings_are_inside(self, width, farthest):

@@ -411,6 +411,10 @@ def test_a_spring_that_is_hardly_known_leaves_no_other_number(healthy_result):
 
 @pytest.mark.parametrize("verdict", Verdict)
 def test_a_viscous_friction_counts_where_it_is_told_apart_from_a_lag(healthy_result, verdict):
+    """And so does the share by which it is larger upward."""
     viscous = Parameter("viscous_friction", 4.9e3, 100.0, 200.0, verdict)
-    numbers = numbers_with(healthy_result, viscous_friction=viscous)
-    assert ("viscous_friction" in numbers) is (verdict is Verdict.IDENTIFIED)
+    found = {"viscous_asymmetry": {"value": 0.5, "half_width": 0.1}}
+    evidence = {**healthy_result.evidence, IMPERFECTIONS_FOUND: found}
+    numbers = numbers_with(replace(healthy_result, evidence=evidence), viscous_friction=viscous)
+    known = {"viscous_friction", "viscous_asymmetry"} & numbers.keys()
+    assert len(known) == (2 if verdict is Verdict.IDENTIFIED else 0)

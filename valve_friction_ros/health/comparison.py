@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 from valve_friction_ros.health.baseline import Baseline, SlidingFriction
 from valve_friction_ros.health.measured import Measured
-from valve_friction_ros.health.valve_numbers import SHARED
+from valve_friction_ros.health.valve_numbers import SHARED, SURE_SPRING
 from valve_friction_ros.identification import SLIDING, SPEED_EXPONENT, Parameter, Verdict
 from valve_friction_ros.identification.trust.uncertainty import NORMAL_QUANTILE
 from valve_friction_ros.wording import Code, Statement, said, sentence
@@ -163,7 +163,7 @@ def carried(
     sliding = sliding.without_calibration
     if speed == to.speed:
         return SlidingFriction(sliding.value, sliding.half_width, speed)
-    shares = _viscous_shares(parameters.get("viscous_friction"), sliding.value / speed)
+    shares = _viscous_shares(_viscous_of(parameters), sliding.value / speed)
     step, doubt = _step(math.log(to.speed / speed), shares, numbers.get(SPEED_EXPONENT))
     if doubt > _WIDEST_STEP:
         if not far:
@@ -172,6 +172,16 @@ def carried(
     value = sliding.value * math.exp(step)
     share = math.hypot(sliding.half_width / sliding.value, doubt)
     return SlidingFriction(value, share * value, to.speed)
+
+
+def _viscous_of(parameters: Mapping[str, Parameter]) -> Parameter | None:
+    """Return F_v; None where the record does not separate it from a spring (`SURE_SPRING`)."""
+    spring = parameters.get("spring_constant")
+    if spring is not None and spring.verdict is not Verdict.FIXED:
+        one = spring.without_calibration
+        if not one.half_width <= SURE_SPRING * one.value:
+            return None
+    return parameters.get("viscous_friction")
 
 
 def _viscous_shares(viscous: Parameter | None, largest: float) -> tuple[float, float]:
@@ -214,7 +224,7 @@ def _farthest_step(
     Nothing usual narrows them, and F_v only where it is identified: a weak one holds for the speeds
     of its record, whose lag or creep it may be.
     """
-    viscous = parameters.get("viscous_friction")
+    viscous = _viscous_of(parameters)
     if viscous is not None and viscous.without_calibration.verdict is not Verdict.IDENTIFIED:
         viscous = None
     low, high = sorted(

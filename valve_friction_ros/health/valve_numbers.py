@@ -262,7 +262,7 @@ _SLIP_SHARE = 0.5
 
 Chosen: on simulated valves whose friction falls with speed, 0.4 to 1 of F_s − F_c was found."""
 
-_SURE_SPRING = 0.1
+SURE_SPRING = 0.1
 """Largest relative half width of the spring constant at which the numbers of a fit are used.
 
 Chosen. Above it, the record does not separate spring from friction, and all numbers of the fit
@@ -288,8 +288,8 @@ def valve_numbers(result: Result) -> dict[str, Measured]:
     fit = fit_numbers(known)
     if fit:
         fit |= _imperfections(result.evidence, known)
-    for name in IDENTIFIED_ONLY:
-        if result.parameters[name].without_calibration.verdict is not Verdict.IDENTIFIED:
+    if result.parameters["viscous_friction"].without_calibration.verdict is not Verdict.IDENTIFIED:
+        for name in (*IDENTIFIED_ONLY, "viscous_asymmetry"):  # a share of F_v is known no better
             fit.pop(name, None)
     if result.misfit is not None and not result.misfit.describes:
         balance = {n: result.parameters[n] for n in _OF_THE_BALANCE if n in result.parameters}
@@ -319,7 +319,7 @@ def fit_numbers(known: Mapping[str, Measured]) -> dict[str, Measured]:
     The result is empty where the spring constant is not known well enough.
     """
     spring = known.get("spring_constant")
-    if spring is None or spring.share > _SURE_SPRING:
+    if spring is None or spring.share > SURE_SPRING:
         return {}
     numbers = {name: known[name] for name in COMPARED if name in known}
     if {"static_friction", "coulomb_friction"} <= known.keys():

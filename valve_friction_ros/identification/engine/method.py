@@ -287,7 +287,8 @@ def _of_simulation(
             f"no friction model reproduces the record (fit {100 * misfit.fit:.0f} %, "
             f"{misfit.systematic * 1e3:.2g} mm misfit): check that both signals belong to this "
             "valve, check their units, and check that the stem reaches both ends of the travel; "
-            "if the packing was changed during the record, clear the buffer and record again"
+            "if the packing or the pressure of the process changed during the record, clear the "
+            "buffer and record again"
         )
     if profile.has_imperfections:
         follows = not verdicts.split_doubt(fits, misfit, profile)
