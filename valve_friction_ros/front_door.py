@@ -21,9 +21,9 @@ from valve_friction_ros.health.baseline import Baseline
 from valve_friction_ros.health.diagnosis import Diagnosis, FrictionLimits
 from valve_friction_ros.health.valve_diagnosis import diagnose_valve
 from valve_friction_ros.identification.result import Result
-from valve_friction_ros.model.checks import A_VALVE, require_row, require_type
+from valve_friction_ros.model.checks import A_VALVE, require_type
 from valve_friction_ros.model.drive import Drive
-from valve_friction_ros.model.recording import Recording
+from valve_friction_ros.model.recording import Recording, require_row
 from valve_friction_ros.model.simulation import StemState, Trajectory
 from valve_friction_ros.model.simulation import simulate as simulated
 from valve_friction_ros.model.valve import KarnoppParameters, Valve

@@ -82,7 +82,7 @@ def test_a_killed_worker_is_a_row(address, folder, arguments, command, monkeypat
     assert code == 1, err
     rows = rows_of(arguments[2])
     assert {name for name, row in rows.items() if row["error"]} == {"deadly.csv", "broken.csv"}
-    assert "the process of its worker died 1 times" in rows["deadly.csv"]["error"]
+    assert "its worker process died 1 time," in rows["deadly.csv"]["error"]
     assert rows["broken.csv"]["error"].startswith("only one column")
     code, _, err = command("identify-folder", *arguments, "--scheduler", address)
     assert "6 recordings: 6 done before, 0 to do" in err

@@ -276,6 +276,16 @@ TEXT = """
     """
 
 
+@pytest.mark.parametrize("command", [["demo"], ["call", "/fv_101", "identify"]])
+def test_without_ros_one_line_says_so(command):
+    code = "import sys; sys.modules['rclpy'] = None; from valve_friction_ros.commands.main import *"
+    run = [sys.executable, "-c", f"{code}; sys.exit(run({command}))"]
+    ran = subprocess.run(run, check=False, capture_output=True, text=True, timeout=300)
+    assert ran.returncode == 2
+    told = rf"valve_friction {command[0]}: ROS 2 is needed \(.*rclpy.*\): source it, or .*\n"
+    assert re.fullmatch(told, ran.stderr)
+
+
 def test_options_from_their_help():
     """Paths, texts, flags, and what is said beside."""
     parser = argparse.ArgumentParser()

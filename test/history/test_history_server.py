@@ -172,7 +172,7 @@ class TestTrouble:
         [
             (lambda url: url.replace("owner@", f"nobody:{SECRET}@"), "password"),
             (lambda url: re.sub(":[0-9]+/", ":1/", url), "check that the server runs"),
-            (lambda url: url + "x", "make it, or name another database"),
+            (lambda url: url + "x", "create it, or name another database"),
             (lambda url: url + "?sslmode=require", "check sslmode"),
             (lambda url: url + f"?nonsense=1&password={SECRET}", "cannot read"),
         ],

@@ -30,10 +30,7 @@ def run(options: argparse.Namespace) -> int:
         raise ValueError(f"--timeout must be above zero, got {options.timeout:g}")
     if options.fail_on and options.service != "identify":
         raise ValueError(f"--fail-on: {options.service} makes no diagnosis; identify does")
-    try:
-        from valve_friction_ros.nodes.service_call import caller  # noqa: PLC0415 - needs ROS
-    except ImportError as error:
-        raise ValueError(f"this command needs ROS 2: {error}") from None
+    from valve_friction_ros.nodes.service_call import caller  # noqa: PLC0415 - needs ROS
 
     columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
     with (

@@ -84,10 +84,15 @@ def _run(name: str, arguments: Sequence[str]) -> int:
     DECLARATIONS[name](parser)
     options = parser.parse_args(arguments, argparse.Namespace(command=name))
     package, _, _ = __name__.rpartition(".")
-    module = importlib.import_module(f"{package}.{re.sub('[- ]', '_', name)}")
-    let_interrupt_raise()
     try:
+        module = importlib.import_module(f"{package}.{re.sub('[- ]', '_', name)}")
+        let_interrupt_raise()
         code: int = module.run(options)
+    except ImportError as error:
+        from valve_friction_ros.nodes.start import lack_of_ros  # noqa: PLC0415 - rarely
+
+        complain(name, lack_of_ros(error))
+        return ExitCode.REFUSED
     except (ValueError, RefusalError, HistoryError) as error:
         complain(name, error)
         return ExitCode.REFUSED

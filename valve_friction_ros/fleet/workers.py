@@ -46,6 +46,7 @@ from queue import Empty, SimpleQueue
 from typing import Any, Generic, TypeVar
 
 from valve_friction_ros import __version__
+from valve_friction_ros.wording import numbered
 
 _Task = TypeVar("_Task")
 _Answer = TypeVar("_Answer")
@@ -482,8 +483,8 @@ def _cause(error: Exception) -> str:
         times = error.allowed_failures + 1
         where = error.last_worker.address
         return (
-            f"its worker process died {times} times, last on {where}, perhaps because the machine "
-            "ran out of memory"
+            f"its worker process died {numbered(times, 'time')}, last on {where}, perhaps because "
+            "the machine ran out of memory"
         )
     return " ".join(f"unexpected {type(error).__name__} of its worker: {error}".split())
 

@@ -19,9 +19,6 @@ from decimal import Decimal
 from types import MappingProxyType
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 
 def frozen(mapping: Mapping[Any, Any]) -> MappingProxyType[Any, Any]:
     """Return a read-only copy of a mapping."""
@@ -43,25 +40,6 @@ def require_type(name: str, given: object, remedy: str, *kinds: type) -> None:
         raise TypeError(
             f"{name} must be of type {known}, got {type(given).__name__}: give {remedy}"
         )
-
-
-def require_row(name: str, values: object) -> NDArray[np.float64]:
-    """Return a copy of a row of finite numbers, or raise ValueError with its name and the sample.
-
-    A masked value of a numpy array is no number.
-    """
-    try:
-        row = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"{name} must be a row of numbers: {error}") from None
-    if row.ndim != 1 or row.size == 0:
-        raise ValueError(f"{name} must be a row of samples, got shape {row.shape}")
-    if isinstance(values, np.ma.MaskedArray):
-        row[values.mask] = np.nan
-    finite = np.isfinite(row)
-    if not finite.all():
-        raise ValueError(f"{name} is not finite at sample {int(np.argmin(finite))}")
-    return row
 
 
 def require_finite(name: str, value: float) -> float:

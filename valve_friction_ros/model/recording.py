@@ -16,13 +16,27 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from valve_friction_ros.model.checks import (
-    require_finite,
-    require_non_negative,
-    require_positive,
-    require_row,
-)
+from valve_friction_ros.model.checks import require_finite, require_non_negative, require_positive
 from valve_friction_ros.model.drive import DEFAULT_LAG, Drive
+
+
+def require_row(name: str, values: object) -> NDArray[np.float64]:
+    """Return a copy of a row of finite numbers, or raise ValueError with its name and the sample.
+
+    A masked value of a numpy array is no number.
+    """
+    try:
+        row = np.array(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"{name} must be a row of numbers: {error}") from None
+    if row.ndim != 1 or row.size == 0:
+        raise ValueError(f"{name} must be a row of samples, got shape {row.shape}")
+    if isinstance(values, np.ma.MaskedArray):
+        row[values.mask] = np.nan
+    finite = np.isfinite(row)
+    if not finite.all():
+        raise ValueError(f"{name} is not finite at sample {int(np.argmin(finite))}")
+    return row
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,12 +21,24 @@ def _end(*_: object) -> None:
     os._exit(0)
 
 
+def lack_of_ros(error: ImportError) -> str:
+    """Return the line that says that ROS 2 is missing; raises `error` if something else is."""
+    name = (error.name or "").partition(".")[0]
+    if not (name.startswith(("rcl", "builtin_interfaces")) or name.endswith(("_msgs", "_srvs"))):
+        raise error
+    return f"ROS 2 is needed ({error}): source it, or use the environment of `make venv`"
+
+
 def _start(node: str) -> int:
     """Import and run a node; Ctrl-C or SIGTERM during the import ends the process at once."""
     # An exception raised during an import may be swallowed there.
     for request in (signal.SIGINT, signal.SIGTERM):
         signal.signal(request, _end)
-    module = importlib.import_module(f"valve_friction_ros.nodes.{node}")
+    try:
+        module = importlib.import_module(f"valve_friction_ros.nodes.{node}")
+    except ImportError as error:
+        sys.stderr.write(f"{node.partition('.')[0]}: {lack_of_ros(error)}\n")
+        return 2
     if {"-h", "--help"} & set(sys.argv[1:]):
         # A reader that stops early, such as `head`, ends the program silently.
         signal.signal(signal.SIGPIPE, signal.SIG_DFL)
