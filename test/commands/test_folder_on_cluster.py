@@ -53,6 +53,7 @@ def arguments(folder, tmp_path):
     return (folder, "--output", tmp_path / "friction.csv", "--method", "bench")
 
 
+@pytest.mark.slow
 def test_the_rows_and_reports_of_the_local_run(address, tmp_path, command, monkeypatch):
     """To the last digit, also of a folder that is named from here."""
     monkeypatch.chdir(PROJECT)

@@ -194,6 +194,7 @@ def test_the_default_method_with_a_gap(folder, noisy, tmp_path, bench_yaml):
     assert "gap" not in (rows["whole.csv"]["warnings"] or "")
 
 
+@pytest.mark.slow
 def test_killed_and_resumed(fleet, output, arguments):
     code, _, _ = interrupted(arguments, output, lambda process: process.kill())
     assert code == -signal.SIGKILL

@@ -171,6 +171,7 @@ class TestFaults:
             postgres.start()
         assert all_of(History(database)) == all_of(history)
 
+    @pytest.mark.slow
     def test_killed_and_paused_under_load(self, history, database, postgres):
         """The one who writes is not held up, and each row arrives once."""
         slowest, stop, written = [0.0], threading.Event(), []
@@ -214,6 +215,7 @@ class TestFaults:
             repr(one) for one in history.entries()
         ]
 
+    @pytest.mark.slow
     def test_a_sender_that_is_killed(self, history, database):
         """At any instant, also between the server's commit and what the file notes of it."""
         written, folder, name = 0, history.path.parent, history.path.name

@@ -212,6 +212,7 @@ class TestTrouble:
         with pytest.raises(ValueError, match=f"{name}: no address"):
             server_from("", environment={name: "s3cret"})
 
+    @pytest.mark.slow
     def test_a_server_that_stands_still_is_left(self, history, server, postgres, monkeypatch):
         monkeypatch.setattr(connections, "_PATIENCE_WITH_SERVER", 1.0)
         late = pytest.raises(

@@ -119,16 +119,14 @@ def test_every_parameter_is_described_with_its_unit_and_its_range(live, name):
             assert limits[0] < limits[1]
 
 
-@pytest.mark.parametrize(
-    ("changes", "words"), BAD_CHANGES, ids=["-".join(map(str, c.items())) for c, _ in BAD_CHANGES]
-)
-def test_bad_change_is_refused_with_the_rule(client, changes, words):
-    before = client.parameters(NODE, *changes)
-    result = client.set_together(NODE, changes)
-    assert not result.successful
-    assert words in result.reason
-    after = client.parameters(NODE, *changes)
-    assert [str(value) for value in after] == [str(value) for value in before]
+def test_bad_changes_are_refused_with_the_rule(client):
+    names = {name for changes, _ in BAD_CHANGES for name in changes}
+    before = client.parameters(NODE, *names)
+    for changes, words in BAD_CHANGES:
+        result = client.set_together(NODE, changes)
+        assert not result.successful, changes
+        assert words in result.reason, changes
+    assert str(client.parameters(NODE, *names)) == str(before)
 
 
 def test_good_changes_take_effect_and_unrelated_parameters_stay_settable(client):

@@ -274,6 +274,7 @@ def stuck(live, tmp_path, systemd):
     return process, tmp_path / BLOCK
 
 
+@pytest.mark.slow
 def test_a_loop_that_stands_still(live, systemd, stuck):
     process, block = stuck
     client = live.client
@@ -314,6 +315,7 @@ def test_a_stuck_node_ends_all_the_same(live, stuck, number):
     assert "in poll_when_free" in process.errors
 
 
+@pytest.mark.slow
 def test_an_identification_that_does_not_return(live, tmp_path, systemd):
     process = live.start_identifier({"identification_limit": 1.0}, script=faulty("slow"))
     client = live.client
@@ -377,6 +379,7 @@ def test_a_process_that_is_frozen_within_c_ends_by_itself(live, tmp_path, what, 
         assert lasted < WITHIN + 1.0
 
 
+@pytest.mark.slow
 def test_silent_inputs_alone_end_nothing(live):
     """The middleware is asked several times, and answers."""
     process = live.start("identifier", script=faulty("frozen"))
