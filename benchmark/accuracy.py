@@ -15,7 +15,6 @@ import os
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
-from functools import partial
 from itertools import product
 from pathlib import Path
 
@@ -25,8 +24,6 @@ from benchmark.bounds import (
     by_case,
     case_bounds,
     cases_table,
-    coverage_bounds,
-    default_bounds,
     information_table,
 )
 from benchmark.cases import (
@@ -48,9 +45,7 @@ from benchmark.harness.rows import (
     new_file,
     opened_console,
 )
-from valve_friction_ros.identification import DEFAULT_METHOD
 
-_FIRST_COVERAGE_SEED = 10_000
 _KARNOPP = [name for name, plant in PLANTS.items() if plant.is_karnopp]
 
 _Found = tuple[Sequence[Outcome | Information], list[Bound]]
@@ -63,7 +58,6 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--parts", nargs="+", choices=parts, default=parts, help="what to run")
     parser.add_argument("--seeds", type=int, default=20, help="records of the square wave")
     parser.add_argument("--other-seeds", type=int, default=3, help="records of all other cases")
-    parser.add_argument("--coverage", type=int, default=200, help="records for the coverage")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="processes")
     parser.add_argument("--output", type=new_file, default=Path("accuracy"), help="of the JSON")
     return parser
@@ -78,43 +72,13 @@ def _seeds_of(case: Case, options: argparse.Namespace) -> int:
     return int(options.other_seeds)
 
 
-def _judged_by_case(
-    outcomes: Sequence[Outcome], bounds_of: Callable[[Sequence[Outcome]], list[Bound]]
-) -> _Found:
-    groups = by_case(outcomes).values()
-    return outcomes, [bound for group in groups for bound in bounds_of(group)]
-
-
-def _coverage(options: argparse.Namespace, _: Console) -> _Found:
-    """Identify the main noise at 1 kHz by `bench`, often enough to count its intervals."""
-    tasks = [
-        (Case(name, "square", "28.6 µm", "1 kHz"), _FIRST_COVERAGE_SEED + seed)
-        for name in _KARNOPP
-        for seed in range(options.coverage)
-    ]
-    return _judged_by_case(in_parallel("coverage", run, tasks, options.jobs), coverage_bounds)
-
-
-def _default(options: argparse.Namespace, console: Console) -> _Found:
-    """Identify the main noise at 1 kHz by the default method."""
-    tasks = [
-        (Case(plant, excitation, "28.6 µm", "1 kHz"), seed)
-        for plant, excitation in product(PLANTS, EXCITATIONS)
-        for seed in range(options.other_seeds)
-    ]
-    work = partial(run, method=DEFAULT_METHOD)
-    outcomes = in_parallel("default", work, tasks, options.jobs)
-    console.print(cases_table(outcomes))
-    return _judged_by_case(outcomes, default_bounds)
-
-
 def _cases(options: argparse.Namespace, console: Console) -> _Found:
     """Identify all combinations of plant, excitation, noise and sampling by `bench`."""
     cases = [Case(*names) for names in product(PLANTS, EXCITATIONS, NOISES, CONDITIONS)]
     tasks = [(case, seed) for case in cases for seed in range(_seeds_of(case, options))]
     outcomes = in_parallel("cases", run, tasks, options.jobs)
     console.print(cases_table(outcomes))
-    return _judged_by_case(outcomes, case_bounds)
+    return outcomes, [one for group in by_case(outcomes).values() for one in case_bounds(group)]
 
 
 def _information(_: argparse.Namespace, console: Console) -> _Found:
@@ -126,8 +90,6 @@ def _information(_: argparse.Namespace, console: Console) -> _Found:
 
 
 _RUNS: Mapping[str, Callable[[argparse.Namespace, Console], _Found]] = {
-    "coverage": _coverage,
-    "default": _default,
     "cases": _cases,
     "information": _information,
 }

@@ -13,7 +13,6 @@
 import statistics
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from rich.table import Table
@@ -28,9 +27,6 @@ from benchmark.harness.rows import Bound
 from valve_friction_ros.identification import (
     Verdict,
 )
-
-COVERAGE = (0.90, 0.99)
-"""Required range of the share of records whose 95 % interval covers the truth."""
 
 FORCE_BOUND = 0.05
 
@@ -135,27 +131,6 @@ def case_bounds(outcomes: Sequence[Outcome]) -> list[Bound]:
     """Check every bound that applies to the outcomes of one case."""
     checks = (_square_bounds, _force_bound, _claims, _mass)
     return [bound for check in checks for bound in check(outcomes)]
-
-
-def default_bounds(outcomes: Sequence[Outcome]) -> list[Bound]:
-    """Check that the default method makes no wrong claim in one case."""
-    bounds = [bound for check in (_claims, _mass) for bound in check(outcomes)]
-    return [replace(bound, what=f"default method, {bound.what}") for bound in bounds]
-
-
-def coverage_bounds(outcomes: Sequence[Outcome]) -> list[Bound]:
-    """Check the coverage of each parameter with a true value in one case."""
-    case = outcomes[0].case
-    names = ["coulomb_friction", "viscous_friction", "spring_constant", "spring_preload"]
-    if _slips(case):
-        names.append("static_friction")
-    bounds = []
-    for name in names:
-        share, answers = coverage_of(outcomes, name)
-        what = f"{case.plant_name}: 95 % interval of {name} covers 90 to 99 % of records"
-        met = COVERAGE[0] <= share <= COVERAGE[1]
-        bounds.append(Bound(what, f"{share:.1%} of {answers}", met))
-    return bounds
 
 
 _SHOWN = ("coulomb_friction", "viscous_friction", "spring_constant", "static_friction")

@@ -302,12 +302,12 @@ def force_error(case: Case, result: Result) -> float:
     return float(np.max(np.abs(found / truth - 1)))
 
 
-def run(case: Case, seed: int, method: str = "bench") -> Outcome:
-    """Identify one record, and compare the result with the truth."""
+def run(case: Case, seed: int) -> Outcome:
+    """Identify one record by `bench`, and compare the result with the truth."""
     recording = case.record(seed)
     begin = time.perf_counter()
     try:
-        result = identify(recording, case.plant.valve, SETTINGS, method)
+        result = identify(recording, case.plant.valve, SETTINGS, "bench")
     except RefusalError as refusal:
         return Outcome(case, seed, time.perf_counter() - begin, str(refusal))
     seconds = time.perf_counter() - begin

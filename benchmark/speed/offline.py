@@ -326,7 +326,6 @@ _PEER_SAMPLES = {"square": slice(10_400), "sine": slice(10_400), "noisy square":
 """Samples for the peers: a period of the square wave, or 0.4 s of sliding."""
 
 _TOLERANCES = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
-_SUBSTEPS = (100, 1000, 3000, 10_000, 30_000)
 _TIMES_FASTER = 1000
 _TIMES_FLOOR = 2
 
@@ -396,54 +395,6 @@ def _ivp(parameters: KarnoppParameters, method: str, tolerance: float, pressure:
 
 
 @numba.njit(cache=True)
-def _euler(
-    forces: Floats,
-    step: float,
-    substeps: int,
-    position: float,
-    mass: float,
-    spring: float,
-    coulomb: float,
-    viscous: float,
-    limit: float,
-) -> Floats:
-    positions = np.empty_like(forces)
-    positions[0] = position
-    velocity = 0.0
-    for sample in range(1, forces.size):
-        rate = (forces[sample] - forces[sample - 1]) / substeps
-        for substep in range(substeps):
-            pull = forces[sample - 1] + rate * substep - spring * position
-            if abs(velocity) < limit:
-                if abs(pull) <= coulomb:
-                    velocity, acceleration = 0.0, 0.0
-                else:
-                    acceleration = (pull - math.copysign(coulomb, pull)) / mass
-            else:
-                friction = math.copysign(coulomb, velocity) + viscous * velocity
-                acceleration = (pull - friction) / mass
-            position += step * velocity
-            velocity += step * acceleration
-        positions[sample] = position
-    return positions
-
-
-def _euler_of(parameters: KarnoppParameters, substeps: int, pressure: Floats) -> Floats:
-    """Simulate (1) and (2) by a compiled Euler method with `substeps` steps per sample."""
-    return _euler(
-        BENCH_VALVE.actuator_force(pressure) - parameters.spring_preload,
-        PERIOD / substeps,
-        substeps,
-        balanced_state(BENCH_VALVE, parameters, float(pressure[0])).position,
-        parameters.mass,
-        parameters.spring_constant,
-        parameters.coulomb_friction,
-        parameters.viscous_friction,
-        max(parameters.limit_velocity, 1e-7),
-    )
-
-
-@numba.njit(cache=True)
 def bare_recursion(forces: Floats) -> tuple[Floats, Floats]:
     """Step a linear second-order system under a force that is linear between samples."""
     positions, velocities = np.empty_like(forces), np.empty_like(forces)
@@ -482,13 +433,6 @@ def _ladders(parameters: KarnoppParameters) -> Iterator[list[tuple[str, Simulati
             )
             for tolerance in _TOLERANCES
         ]
-    yield [
-        (
-            f"Euler, compiled, {substeps} steps a sample",
-            partial(_euler_of, parameters, substeps),
-        )
-        for substeps in _SUBSTEPS
-    ]
 
 
 def _rows(valve_name: str, pressure_name: str, settings: Settings) -> Iterator[Row]:
@@ -514,11 +458,9 @@ def _rows(valve_name: str, pressure_name: str, settings: Settings) -> Iterator[R
             settings.say(f"{ladder[0][0]}: not accurate at any setting")
             continue
         name, simulation = found
-        repeats = settings.repeats if "Euler" in name else 1
-        cost = medians({"peer": partial(simulation, short)}, repeats)["peer"]
+        cost = medians({"peer": partial(simulation, short)}, 1)["peer"]
         peer = 1e9 * cost / short.size
-        if "solve_ivp" in name:
-            best_ivp = min(best_ivp, peer)
+        best_ivp = min(best_ivp, peer)
         yield Row(item, each, "ns", peer, name)
     goal, met = f"{_TIMES_FASTER} times faster", bool(best_ivp >= _TIMES_FASTER * each)
     yield Row(item, each, "ns", float(best_ivp), "the better solve_ivp", goal, met)

@@ -24,7 +24,7 @@ import numpy as np
 import pytest
 from bags import messages_of, write_bag
 from kept_rows import csv_rows, kept, rows_of
-from waiting import PATIENCE, wait_until
+from processes import PATIENCE, wait_until
 
 from valve_friction_ros.commands.main import run as run_here
 from valve_friction_ros.identification import IdentificationSettings, identify_bench
@@ -249,7 +249,10 @@ def test_a_page_against_baselines(folder, texts, tmp_path, output, arguments, ca
     assert "no recording of" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+@pytest.mark.parametrize(
+    ("number", "code"),
+    [(signal.SIGINT, 130), pytest.param(signal.SIGTERM, 143, marks=pytest.mark.slow)],
+)
 def test_interrupted(fleet, output, arguments, number, code):
     """Ctrl-C goes to all processes of the group; so may a SIGTERM."""
     found, out, err = interrupted(arguments, output, lambda process: os.killpg(process.pid, number))
@@ -261,6 +264,7 @@ def test_interrupted(fleet, output, arguments, number, code):
     assert set(done(output)) < set(fleet)
 
 
+@pytest.mark.slow
 def test_a_process_that_dies_costs_its_recording_only(folder, texts, output, arguments, capsys):
     for name in ("a", "b", "deadly", "e", "f"):
         (folder / f"{name}.csv").write_text(texts[0])

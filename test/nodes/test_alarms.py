@@ -122,7 +122,7 @@ def test_stamps_of_a_time_to_come(live, history, tmp_path):
     assert AGE.search(status.message)
 
 
-@pytest.mark.parametrize("gone", ["removed", "replaced"])
+@pytest.mark.parametrize("gone", ["removed", pytest.param("replaced", marks=pytest.mark.slow)])
 def test_a_history_that_goes_while_the_node_runs_costs_no_baseline(live, history, gone):
     node = live.start_identifier()
     client = live.client

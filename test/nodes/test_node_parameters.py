@@ -14,7 +14,7 @@ import re
 
 import numpy as np
 import pytest
-from live_nodes import NAMESPACE, NODE, SECOND, WARN, SimulatedClock, buffered, stamp_of, values_of
+from live_nodes import NODE, SECOND, WARN, SimulatedClock, buffered, stamp_of, values_of
 from rcl_interfaces.msg import ParameterType
 from records import quick_record, simulated
 from std_msgs.msg import Float64MultiArray
@@ -27,7 +27,6 @@ from valve_friction_ros.identification import (
 )
 from valve_friction_ros.model import BENCH_VALVE, HIGH_FRICTION, TriangleWave
 
-NODES = ("identifier", "simulator", "pressure_source")
 OF_ROS = re.compile(r"use_sim_time|start_type_description_service|qos_overrides\..*")
 CHECKED_BY_RULE = {  # floating parameters that may be infinite or not given, so have no range
     "travel": -0.01,
@@ -100,13 +99,10 @@ def range_of(descriptor):
     return (ranges[0].from_value, ranges[0].to_value) if ranges else None
 
 
-@pytest.mark.parametrize("name", NODES)
-def test_every_parameter_is_described_with_its_unit_and_its_range(live, name):
-    live.start(name)
-    client, node = live.client, f"{NAMESPACE}/{name}"
-    names = [name for name in client.parameter_names(node) if not OF_ROS.fullmatch(name)]
+def test_every_parameter_is_described_with_its_unit_and_its_range(client):
+    names = [name for name in client.parameter_names(NODE) if not OF_ROS.fullmatch(name)]
     assert len(names) >= 10
-    for descriptor in client.describe(node, names):
+    for descriptor in client.describe(NODE, names):
         assert re.search(r"\w.*\[[^\]]+\]", descriptor.description), (
             f"{descriptor.name}: no unit in {descriptor.description!r}"
         )
@@ -183,7 +179,7 @@ def test_a_signature_is_identified(client):
 
 
 def test_former_names_are_understood(client):
-    for former, used in (("robust", "plant"), ("refined", "bench"), ("best", "plant")):
+    for former, used in (("robust", "plant"), ("refined", "bench")):
         assert client.set_together(NODE, {"method": former}).successful
         client.identified(quick_record())
         assert values_of(client.next_status())["method"] == used

@@ -300,7 +300,9 @@ def test_a_loop_that_stands_still(live, systemd, stuck):
     assert "STOPPING=1" in systemd.heard()
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize(
+    "number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)]
+)
 def test_a_stuck_node_ends_all_the_same(live, stuck, number):
     process, block = stuck
     block.touch()
@@ -367,8 +369,8 @@ def frozen_end(live, tmp_path, what):
     ("what", "where"),
     [
         (LOOP, "in _run"),
-        (MIDDLEWARE, "in _end_if_the_middleware_hangs"),
-        (CLEAN_UP, "in _run_until"),
+        pytest.param(MIDDLEWARE, "in _end_if_the_middleware_hangs", marks=pytest.mark.slow),
+        pytest.param(CLEAN_UP, "in _run_until", marks=pytest.mark.slow),
     ],
 )
 def test_a_process_that_is_frozen_within_c_ends_by_itself(live, tmp_path, what, where):

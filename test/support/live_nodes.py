@@ -22,6 +22,7 @@ import prepared
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray
 from extension.diagnostic_keys import is_explained
+from processes import PATIENCE
 from rcl_interfaces.srv import (
     DescribeParameters,
     GetParameters,
@@ -36,7 +37,6 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import FluidPressure, JointState
 from std_msgs.msg import Float64, Float64MultiArray
 from std_srvs.srv import Trigger
-from waiting import PATIENCE
 
 from benchmark.harness.run import Participant
 
