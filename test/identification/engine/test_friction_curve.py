@@ -515,6 +515,15 @@ class TestMeanSpeed:
 
         assert self.of(time, np.full(time.size, 0.01), 1.0) == 0.0  # at rest
 
+    @pytest.mark.parametrize("apart", [1e-9, 1e-5])
+    def test_two_stamps_that_nearly_coincide_make_no_stem_fast(self, apart):
+        """Jumps of 5 mm within 10 ms; the samples of one are stamped almost at once."""
+        time = np.arange(0.0, 20.0, 0.01)
+        position = 5e-3 * (np.floor(time) % 2)
+        usual = self.of(time, position, 19 * 5e-3)
+        time[100] = time[99] + apart
+        assert self.of(time, position, 19 * 5e-3) == pytest.approx(usual, rel=0.1)
+
 
 class TestConverterOfTheForce:
     """A force that stays within one step of its converter throughout each stroke."""

@@ -61,6 +61,9 @@ _QUARTILE, _QUARTER_MAGNITUDE = 0.25, 0.3186
 """Share of the pairs of moves that show noise alone, and the magnitude below which that share of
 normal noise of unit deviation lies. A stem that jumps in most samples leaves the others."""
 
+_LEAST_PAUSE = 0.5
+"""Least time of a move, in lower quartiles of the sampling intervals."""
+
 _WORK_NOISE = 5e-3
 _STROKE_NOISE, _STROKE = 6.0, 0.03
 """Largest share of noise in the work; least stroke that is part of the distance, in deviations of
@@ -172,6 +175,8 @@ class MeasuredSignal(NamedTuple):
         """
         free = free[1:] & free[:-1]
         raw, left, times = np.diff(self.value), np.diff(self.value) * free, np.diff(self.time)
+        # Two stamps of a clock that jitters may nearly coincide, and no stem is that fast.
+        times = np.maximum(times, _LEAST_PAUSE * float(np.quantile(times, _QUARTILE)))
         range_, covered, squares = float(np.ptp(self.value)), 0.0, 0.0
         white = noise = math.sqrt(2.0) * self.noise
         while raw.size > 1:
