@@ -139,6 +139,7 @@ class Code(Enum):
         "spring's force over the travel; {advice}"
     )
     BENCH_SET = "the bench set"
+    AIR_PRESSURE = "the reference of the pressure sensor, gauge or absolute (one atmosphere)"
     DRIVE_ZERO = "the zero of the {drive:drive} sensor ({reading:+.3g} {unit})"
     POSITION_ZERO = "the zero of the position sensor ({reading:in +.2g mm} mm){stops:of stops}"
     UNEVEN_PACKING = "packing with more friction {upward:?up|down}ward"

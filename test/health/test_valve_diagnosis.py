@@ -185,6 +185,13 @@ class TestCausesThatLookTheSame:
         assert len(both) == 2
         assert "noise of the pressure has grown to 6" in both[1].message
 
+    @pytest.mark.parametrize(("pascals", "is_air"), [(101e3, True), (-98e3, True), (60e3, False)])
+    def test_a_shift_by_one_atmosphere_questions_gauge_or_absolute_first(self, pascals, is_air):
+        shifted = 500.0 + VALVE.diaphragm_area * pascals
+        message = found(spring_preload=(shifted, 1.0))[0].message
+        assert ("check the reference of the pressure sensor, gauge or abs" in message) == is_air
+        assert ("check the bench set" in message) != is_air
+
     def test_stops_that_stay_exclude_the_scale_of_the_position(self):
         message = only(found(**scaled(0.75, "spring_constant"))).message
         assert message.endswith("check the spring")

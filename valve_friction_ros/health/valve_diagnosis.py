@@ -27,6 +27,7 @@ from valve_friction_ros.health.measured import (
 )
 from valve_friction_ros.health.valve_numbers import valve_numbers
 from valve_friction_ros.identification import Result
+from valve_friction_ros.identification.trust.stated import is_atmosphere
 from valve_friction_ros.model.drive import Drive
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.wording import Code, Statement, said
@@ -299,7 +300,9 @@ def _preload_causes(case: _Case, shift: Measured) -> tuple[Statement, ...]:
     drive = case.valve.driven_by
     zero_of_drive = case.valve.actuator_drive(shift.value) - case.valve.actuator_drive(0.0)
     reading = zero_of_drive / drive.size
+    is_air = drive is Drive.PRESSURE and is_atmosphere(zero_of_drive)
     causes = [
+        *([said(Code.AIR_PRESSURE)] if is_air else ()),
         said(Code.BENCH_SET),
         said(Code.DRIVE_ZERO, drive=drive.name, reading=reading, unit=drive.unit),
     ]

@@ -154,12 +154,16 @@ def _of_preload(one: Parameter, stated: float, scale: float, valve: Valve) -> Co
     if valve.diaphragm_area is None:
         return Contradiction(one.name, stated, one.value, Cause.OTHER_PRELOAD)
     pressure = (one.value - scale * stated) / valve.diaphragm_area
-    is_air = abs(abs(pressure) / _ATMOSPHERE - 1) < _ALTITUDE
     reference = _reference(pressure, valve)
     cause = Cause.OTHER_PRELOAD
-    if is_air and reference >= -_ALTITUDE * _ATMOSPHERE:
+    if is_atmosphere(pressure) and reference >= -_ALTITUDE * _ATMOSPHERE:
         cause = Cause.ZERO_OF_PRESSURE
     return Contradiction(one.name, stated, one.value, cause, pressure=pressure)
+
+
+def is_atmosphere(pressure: float) -> bool:
+    """Return whether a difference of pressures, Pa, is that of a gauge and an absolute one."""
+    return abs(abs(pressure) / _ATMOSPHERE - 1) < _ALTITUDE
 
 
 def _reference(pressure: float, valve: Valve) -> float:
