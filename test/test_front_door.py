@@ -221,6 +221,8 @@ def test_an_unknown_method_is_named(loose_record, benches):
     told = "there is no method 'guess': choose from plant, bench, published, signature"
     with pytest.raises(ValueError, match=told):
         vf.identify(loose_record, benches["low"].valve, method="guess")
+    with pytest.raises(ValueError, match="the method 'bench', and method 'published'"):
+        vf.identify(loose_record, benches["low"].valve, "bench", method="published")
 
 
 def test_compare_takes_a_result_or_a_number(result):

@@ -101,7 +101,7 @@ def identify(
     RefusalError
         If the record does not determine the friction; the message names cause and remedy.
     ValueError
-        If no method has this name.
+        If no method has this name, or two are named.
     TypeError
         If an argument has another type, such as a frame in place of a recording.
 
@@ -123,6 +123,8 @@ def identify(
     require_type("recording", recording, "what vf.read_recording returns", Recording)
     require_type("valve", valve, A_VALVE, Valve)
     if isinstance(settings, str):
+        if method not in (DEFAULT_METHOD, settings):
+            raise ValueError(f"settings names the method {settings!r}, and method {method!r}")
         return method_named(settings)(recording, valve)
     if settings is not None:
         require_type("settings", settings, "vf.IdentificationSettings(...)", IdentificationSettings)
