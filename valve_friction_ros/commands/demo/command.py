@@ -74,8 +74,6 @@ The mass is given. A published F_s is read from single samples.
 """
 _INTERVALS = 3.0
 """Tolerated error of an identified value, in half widths of its interval."""
-_NEWEST = 2.0
-"""Age, s, up to which a diagnosed estimate is the one just requested."""
 
 
 class Outcome(NamedTuple):
@@ -110,10 +108,10 @@ def identified(client: BenchClient, label: str, truth: KarnoppParameters) -> Out
 
     The picture shows the same record, identified in this process.
     """
-    recording = client.recording()
+    recording, former = client.recording(), client.diagnostic_values.get("estimate_time")
     client.trigger("identify")
     client.wait(
-        lambda: float(client.diagnostic_values.get("estimate_age [s]", "inf")) < _NEWEST,
+        lambda: client.diagnostic_values.get("estimate_time") not in (None, former),
         ANSWER_TIMEOUT,
         "diagnostic of the estimate",
     )
