@@ -163,7 +163,7 @@ def test_the_file_of_another_program_is_left_alone(tmp_path, name, content):
     path = tmp_path / name
     path.write_text(content)
     before = path.stat()
-    with pytest.raises(ValueError, match=r"it is there, but not data\.sqlite"):
+    with pytest.raises(ValueError, match=r"it exists, but data\.sqlite, which holds"):
         ResultsFile(path)
     assert path.read_text() == content
     assert path.stat().st_mtime_ns == before.st_mtime_ns
