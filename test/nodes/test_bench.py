@@ -125,17 +125,17 @@ def test_coulomb_above_static_friction_is_refused(stem):
 def test_stamps_that_go_back_start_the_stem_anew(stem, running):
     _, _, process, _ = running
     stem.respond(PRESSURE[:500])
-    warnings = process.errors.count("returned")
+    warnings = process.errors.count("went backwards")
     position, _ = stem.respond(PRESSURE[300:400])
     expected = simulate(BENCH_VALVE, LOW_FRICTION, PRESSURE[300:400], PERIOD)
     np.testing.assert_allclose(position, expected.position, **EXACT)
 
     def warned():  # once in five seconds, however often they go back
         stem.respond(PRESSURE[300:400])
-        return process.errors.count("returned") > warnings
+        return process.errors.count("went backwards") > warnings
 
     stem.client.wait_until(warned, "a warning")
-    assert process.errors.count("returned") == warnings + 1
+    assert process.errors.count("went backwards") == warnings + 1
 
 
 def test_bad_pressures_are_passed_over(stem):
