@@ -13,9 +13,9 @@ import time
 from types import SimpleNamespace
 
 import numpy as np
+import processes
 import pytest
 import rclpy
-import waiting
 from live_nodes import SECOND, Client, Domain, time_of
 from processes import PATIENCE
 from rclpy.duration import Duration
@@ -52,7 +52,7 @@ def bench():
 
 
 def wait_until(condition, what):
-    return waiting.wait_until(condition, lambda: what)
+    return processes.wait_until(condition, lambda: what)
 
 
 def sender(client, polled):
