@@ -179,7 +179,7 @@ def test_a_signature_is_identified(client):
 
 
 def test_former_names_are_understood(client):
-    for former, used in (("robust", "plant"), ("refined", "bench")):
+    for former, used in (("refined", "bench"), ("best", "plant")):
         assert client.set_together(NODE, {"method": former}).successful
         client.identified(quick_record())
         assert values_of(client.next_status())["method"] == used
