@@ -125,7 +125,8 @@ def node(live, history):
         "input_timeout": 10.0,
         "clock_tolerance": 60.0,
     }
-    return live.start("identifiers", parameters, namespace=None)
+    script = ["-m", "valve_friction_ros.nodes.identifiers"]  # one look a second, as a plant has it
+    return live.start("identifiers", parameters, script=script, namespace=None)
 
 
 @pytest.mark.slow
@@ -154,5 +155,5 @@ def test_nonsense_is_told_within_5_s_cleared_after_it_and_nothing_else_is(live, 
         told = [line for line in lines if "level " not in line]
         begun = [line for line in told if "[WARN]" in line]
         over = [line for line in told if "ended after" in line]
-        assert 1 <= len(over) <= 4, (valve, told)  # wrong stamps are several faults
+        assert 1 <= len(over) <= 4, (valve, over)  # wrong stamps are several faults
         assert len(begun) <= len(over) + 2, (valve, told)
