@@ -12,12 +12,13 @@
 import doctest
 import json
 import math
+import subprocess
+import sys
 from dataclasses import replace
 from importlib import import_module
 
 import numpy as np
 import pytest
-from processes import printed
 
 import valve_friction_ros as vf
 
@@ -47,7 +48,10 @@ def test_some_fifteen_names():
 
 def test_nothing_is_loaded_before_it_is_used():
     code = "import sys, valve_friction_ros; print(*sys.modules)"
-    loaded = printed("-c", code).split()
+    run = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=300
+    )
+    loaded = run.stdout.split()
     assert [name for name in loaded if name.startswith("valve_friction_ros")] == [
         "valve_friction_ros.on_demand",
         "valve_friction_ros",

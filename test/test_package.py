@@ -29,7 +29,7 @@ import pytest
 import rclpy
 import yaml
 from documentation import TEXT
-from processes import PATIENCE, printed
+from waiting import PATIENCE
 
 from valve_friction_ros import __version__
 
@@ -60,7 +60,14 @@ def entry_points():
 def test_there_is_one_version():
     """What setup.py gives is that of package.xml, so is the module's; the change log knows it."""
     declared = ET.parse(PROJECT / "package.xml").getroot().findtext("version")
-    assert printed("setup.py", "--version", cwd=PROJECT).split()[-1] == declared
+    given = subprocess.run(
+        [sys.executable, "setup.py", "--version"],
+        cwd=PROJECT,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert given.stdout.split()[-1] == declared
     assert __version__ == declared
     assert not re.search(r'version="', setup_text())
     assert re.search(rf"^{re.escape(declared)}\b", (PROJECT / "CHANGELOG.rst").read_text(), re.M)
@@ -460,9 +467,15 @@ def test_node_from_the_installed_tree(installed, observer, tmp_path):
         "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
         "ROS_LOG_DIR": str(tmp_path / "log"),
     }
-    code = f"import {NAME}; print({NAME}.__file__)"
-    where = printed("-c", code, cwd=tmp_path, env=environment)
-    assert Path(where.strip()).is_relative_to(library)
+    where = subprocess.run(
+        [sys.executable, "-c", f"import {NAME}; print({NAME}.__file__)"],
+        cwd=tmp_path,
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert Path(where.stdout.strip()).is_relative_to(library)
 
     output = tmp_path / "output.txt"
     command = [installed / "lib" / NAME / "identifier", "--ros-args", "-r", "__ns:=/fv_101"]

@@ -128,7 +128,6 @@ def test_options_describe_a_table_as_its_valve_file_does(tmp_path, monkeypatch, 
     assert answers[0] == answers[1] == answers[2]
 
 
-@pytest.mark.slow
 @pytest.mark.timeout(400)
 def test_the_offline_commands_run_as_they_are_pasted(tmp_path, monkeypatch, capsys):
     for folder in ("examples", "config"):

@@ -19,9 +19,10 @@ import numpy as np
 import pytest
 from histories import SECOND, START, success
 
-from benchmark.churn import hung_services
+from benchmark.churn import RATE, hung_services, missing_samples
 from benchmark.churn import rows as churn_rows
 from benchmark.harness.processes import Process
+from benchmark.harness.run import Ledger
 from benchmark.service import bounds, tables
 from benchmark.service_plants import PLANTS, Duty
 from benchmark.service_trial import Number, Task, Told, stretches
@@ -83,6 +84,31 @@ def test_a_node_that_answers_others_does_not_hang():
     assert hung_services([lost, answer]) == []
     assert hung_services([lost, dict(answer, time=5.0), other]) == [lost["service"]]
     assert hung_services([lost], until=40.0) == []
+
+
+def test_a_run_in_which_nothing_was_looked_at_has_shown_nothing():
+    assert missed([{"kind": "run", "seconds": 120.0}]) == [
+        "participants that came and went",
+        "calls of services and parameters",
+        "stream looked at, both signals",
+        "longest silence on /diagnostics",
+        "nodes ended by SIGINT or SIGTERM",
+    ]
+
+
+def test_missing_samples_are_counted_within_the_record():
+    stamps = np.arange(1000) * (1_000_000_000 // RATE) + 5
+    assert missing_samples(stamps) == 0
+    assert missing_samples(np.delete(stamps, [3, 4, 700])) == 3
+    assert missing_samples(stamps[:0]) == 0
+
+
+def test_ledger_keeps_the_order(tmp_path):
+    ledger = Ledger(tmp_path / "ledger.jsonl")
+    ledger.add("call", service="/a", seconds=None)
+    ledger.add("visit", end="µ")
+    events = [(one["kind"], one.get("end")) for one in ledger.events()]
+    assert events == [("call", None), ("visit", "µ")]
 
 
 def test_hung_process_leaves_its_stacks(tmp_path, monkeypatch):
@@ -191,6 +217,14 @@ def test_a_record_is_whole_and_shows_the_faults_of_its_sensors():
     assert np.isfinite(list(again)).all()
 
 
+def test_the_friction_grows_over_the_month():
+    swings = [
+        np.ptp(np.concatenate([one.position for one in Feed(3.0).record(share, NOW)]))
+        for share in (0.0, 1.0)
+    ]
+    assert swings[1] < swings[0]
+
+
 def test_a_server_that_holds_less_than_the_file_misses_its_goals(postgres, tmp_path):
     postgres.start()
     file = HistoryFile(tmp_path / "history.sqlite")
@@ -249,6 +283,17 @@ def test_a_good_outcome_meets_the_bounds():
 )
 def test_a_bad_one_misses_its_bound(outcome, words):
     assert any(words in one for one in missed_bounds(told(), told("step"), outcome))
+
+
+def test_coverage_is_bound_for_each_valve():
+    """Four hours of one valve outside, among a hundred of another inside."""
+    outside = [Number("static_friction", 100.0, 105.0, 4.0)] * 4
+    inside = [Number("static_friction", 100.0, 104.0, 5.0)] * 100
+    poor = replace(told(), task=Task("low", 12, 0, "steady"), numbers=[*told().numbers, *outside])
+    good = told(numbers=[*told().numbers, *inside])
+    assert missed_bounds(told(), told("step"), good, poor) == [
+        "at least 95 % inside their intervals, of each valve and number"
+    ]
 
 
 def test_the_stem_follows_its_set_points_and_friction_is_that_of_the_plant():

@@ -36,8 +36,11 @@ from benchmark.reality.report import bounds, in_mode, is_useful, judged, report
 from benchmark.reality.sensors import Instruments, Sensor, Signal, Stamping, measured
 from benchmark.reality.trial import Row, Task, sliding_friction, tried
 from benchmark.reality.valves import (
+    IMPERFECTIONS,
     Draft,
     DrawnValve,
+    drawn_cylinder,
+    drawn_imperfections,
     drawn_valve,
     instruments_of,
 )
@@ -47,9 +50,10 @@ def valves(count, slips=False, **options):
     return [drawn_valve(np.random.default_rng([3, n]), slips, **options) for n in range(count)]
 
 
-def test_the_actuator_strokes_the_valve_with_twice_its_friction():
-    for valve in valves(8, slips=True, reserve=2.2):
-        plant = replace(valve.plant, friction=valve.plant.friction.scaled(2.0))
+@pytest.mark.parametrize("grown", [1.0, 2.0])
+def test_the_actuator_strokes_the_valve(grown):
+    for valve in valves(8, slips=True, reserve=2.2 if grown > 1.0 else 1.0):
+        plant = replace(valve.plant, friction=valve.plant.friction.scaled(grown))
         loop = open_loop(valve.low, valve.high - valve.low, 1e-3)
         points = round(2.0 * valve.settling / GRID) + 20_000
         there_and_back = np.concatenate([np.linspace(0.0, 1.0, points), np.ones(points)])
@@ -75,6 +79,20 @@ def test_a_record_moves_both_ways_and_is_the_same_each_time(kind):
         assert (np.diff(signal.stamps) >= 0).all()
 
 
+def test_records_of_one_valve():
+    case = Case(5, Kind.LEVELS, 1, reserve=2.2)
+    first, other = make_record(case), make_record(case._replace(again=1))
+    grown = make_record(case._replace(again=2, change=1.5))
+    assert other.nominal == first.nominal
+    assert other.imperfections == first.imperfections
+    assert not np.array_equal(other.position.values, first.position.values)
+    for name in ("coulomb_friction", "static_friction", "viscous_friction"):
+        assert grown.truth[name].value == pytest.approx(1.5 * first.truth[name].value, rel=0.05)
+    assert grown.truth["spring_constant"].value == pytest.approx(
+        first.truth["spring_constant"].value, rel=0.03
+    )
+
+
 def test_a_loop_hunts_by_rests_and_jumps(monkeypatch):
     valve = DrawnValve(replace(IDEAL, friction=SLIPPING), 0.0, 4e5, 0.8, (0.0, 4e5), "diaphragm")
     draft = Draft(valve, instruments_of(valve, np.random.default_rng(0)))
@@ -86,6 +104,19 @@ def test_a_loop_hunts_by_rests_and_jumps(monkeypatch):
     assert np.mean(np.abs(moves) < 2e-3) > 0.8
     jumps = moves[np.abs(moves) > 0.008]
     assert np.sum(np.diff(np.sign(jumps)) != 0) >= 5
+
+
+def test_imperfections_do_not_exclude_each_other():
+    seen = set()
+    for seed in range(300):
+        random = np.random.default_rng([1, seed])
+        is_cylinder = seed % 2 == 0
+        valve = drawn_cylinder(random, True) if is_cylinder else drawn_valve(random, slips=False)
+        _, names = drawn_imperfections(valve, random)
+        seen |= set(names)
+        assert len(set(names) & {"stem lag", "pressure lag", "volume", "clock offset"}) <= 1
+        assert not (is_cylinder and set(names) & {"curved", "Karnopp", "latched"})
+    assert seen == set(IMPERFECTIONS)
 
 
 def record_of(force, position, period=0.01, **options):
@@ -478,3 +509,13 @@ def test_drops_bursts_and_offset():
     assert np.sort(gaps)[-2:].sum() == pytest.approx(1.0, abs=0.01)
     late = stem(RAMP, stamping=Stamping(offset=0.01))
     assert late.values == pytest.approx(1e-3 * (seconds(late) - 0.01), abs=1e-12)
+
+
+def test_rows_of_a_table_share_all_that_happens():
+    clock = Stamping(jitter=0.3, drops=0.1)
+    pressure, position = measured(RAMP, instruments(clock, together=True), DURATION, 0)
+    assert (pressure.stamps == position.stamps).all()
+    pressure, position = measured(RAMP, instruments(clock), DURATION, 0)
+    assert (
+        pressure.stamps.size != position.stamps.size or (pressure.stamps != position.stamps).any()
+    )

@@ -21,8 +21,9 @@ import time
 from pathlib import Path
 
 import pytest
-from processes import ran, wait_until
+from processes import ran
 from rich.console import Console
+from waiting import wait_until
 
 from valve_friction_ros.commands.demo import command as demo
 from valve_friction_ros.commands.demo import plant

@@ -137,7 +137,6 @@ def test_one_line_names_the_extra(arguments, refused, monkeypatch):
     assert "S3 needs `pip install s3fs 'universal_pathlib>=0.3.10,<0.4'` (the extra `st" in line
 
 
-@pytest.mark.slow
 def test_a_server_that_is_away(arguments, refused, monkeypatch):
     settings = {"s3": {"key": "k", "secret": "s", "endpoint_url": "http://127.0.0.1:9"}}
     monkeypatch.setattr(fsspec.config, "conf", settings)

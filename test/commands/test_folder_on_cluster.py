@@ -21,7 +21,8 @@ from dask_workers import identify, local_cluster
 from documentation import PROJECT
 from kept_rows import kept, rows_of
 from local_server import certificate_pair
-from processes import PATIENCE, ran, wait_until
+from processes import ran
+from waiting import PATIENCE, wait_until
 
 from valve_friction_ros.commands import identify_folder
 from valve_friction_ros.fleet import workers
@@ -52,7 +53,6 @@ def arguments(folder, tmp_path):
     return (folder, "--output", tmp_path / "friction.csv", "--method", "bench")
 
 
-@pytest.mark.slow
 def test_the_rows_and_reports_of_the_local_run(address, tmp_path, command, monkeypatch):
     """To the last digit, also of a folder that is named from here."""
     monkeypatch.chdir(PROJECT)

@@ -25,7 +25,7 @@ import numpy as np
 import pytest
 from bags import messages_of, write_bag
 from kept_rows import csv_rows, kept, rows_of
-from processes import PATIENCE, wait_until
+from waiting import PATIENCE, wait_until
 
 from valve_friction_ros.commands.main import run as run_here
 from valve_friction_ros.identification import IdentificationSettings, identify_bench
@@ -197,7 +197,6 @@ def test_the_default_method_with_a_gap(folder, noisy, tmp_path, bench_yaml):
     assert "gap" not in (rows["whole.csv"]["warnings"] or "")
 
 
-@pytest.mark.slow
 def test_killed_and_resumed(fleet, output, arguments):
     code, _, _ = interrupted(arguments, output, lambda process: process.kill())
     assert code == -signal.SIGKILL
@@ -273,10 +272,7 @@ def test_only_the_newest_diagnosis_of_a_tag_fails_the_command(
         assert ("times its baseline" in out) == (code == 3), (out, err)
 
 
-@pytest.mark.parametrize(
-    ("number", "code"),
-    [(signal.SIGINT, 130), pytest.param(signal.SIGTERM, 143, marks=pytest.mark.slow)],
-)
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_interrupted(fleet, output, arguments, number, code):
     """Ctrl-C goes to all processes of the group; so may a SIGTERM."""
     found, out, err = interrupted(arguments, output, lambda process: os.killpg(process.pid, number))
@@ -288,7 +284,6 @@ def test_interrupted(fleet, output, arguments, number, code):
     assert set(done(output)) < set(fleet)
 
 
-@pytest.mark.slow
 def test_a_process_that_dies_costs_its_recording_only(folder, texts, output, arguments, capsys):
     for name in ("a", "b", "deadly", "e", "f"):
         (folder / f"{name}.csv").write_text(texts[0])

@@ -28,8 +28,8 @@ from typing import NamedTuple
 import pytest
 from browser import axe_violations, chromium
 from local_server import certificate_pair, free_port
-from processes import PATIENCE, wait_until
 from quick_accounts import PASSWORD, quick_account
+from waiting import PATIENCE, wait_until
 
 from valve_friction_ros.dashboard.accounts import VARIABLE, Access, Role
 from valve_friction_ros.dashboard.log_in import Sessions

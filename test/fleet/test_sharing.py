@@ -167,7 +167,6 @@ def test_the_last_worker_goes(monkeypatch):
             list(in_cluster(found, answer, "a", never))
 
 
-@pytest.mark.slow
 def test_the_scheduler_goes(tmp_path):
     begun = tmp_path / "begun"
     with local_cluster() as passing, cluster_at(passing.scheduler_address) as found:

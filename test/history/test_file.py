@@ -31,7 +31,7 @@ from histories import (
     select,
     success,
 )
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from valve_friction_ros.health import (
@@ -254,7 +254,6 @@ def test_a_file_of_version_2_then_has_the_tables_of_a_new_one(history, tmp_path)
     assert [one for one in expected if one[0] != "settings_content"] == found
 
 
-@settings(max_examples=30)
 @given(
     friction=st.floats(1e-300, 1e300),
     half_width=st.floats(0, 1e300),

@@ -19,7 +19,6 @@ from pathlib import Path
 
 import pytest
 from histories import START, change, select, success
-from processes import printed
 from writers import writer
 
 from valve_friction_ros.history import HistoryError, HistoryFile, database, tables
@@ -99,7 +98,15 @@ history.add(success(START))
 
 def printed_by(program, path):
     """Run a program, given a path and the folders of its modules; what it prints."""
-    return printed("-c", program, path, *FOLDERS)
+    run = subprocess.run(
+        [sys.executable, "-c", program, str(path), *map(str, FOLDERS)],
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
+    assert run.returncode == 0, run.stderr
+    return run.stdout
 
 
 def test_a_file_that_may_not_grow(history):

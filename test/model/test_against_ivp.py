@@ -345,6 +345,22 @@ def test_no_energy_from_nothing(parameters, pressure, period, start, travel):
     assert growth <= 8 * EPS * (1 + swing) * terms
 
 
+@given(packings(), pressures(), periods, starts)
+def test_mirrored_force_gives_mirrored_motion(parameters, pressure, period, start):
+    """Negation rounds nothing, so the mirrored motion is the same to the last digit."""
+    valve = Valve(AREA)
+    found = simulate(valve, parameters, pressure, period, start)
+    mirrored = simulate(
+        valve,
+        replace(parameters, spring_preload=-parameters.spring_preload),
+        -pressure,
+        period,
+        StemState(-start.position, -start.velocity),
+    )
+    np.testing.assert_array_equal(mirrored.position, -found.position)
+    np.testing.assert_array_equal(mirrored.velocity, -found.velocity)
+
+
 BENCHES = [
     (BENCH_VALVE, LOW_FRICTION),
     (BENCH_VALVE, HIGH_FRICTION),
@@ -390,3 +406,15 @@ def test_uneven_pieces_end_where_one_run_ends(bench, pressure, seed):
     # but the motion only by that force over the spring, or the impulse over the mass.
     np.testing.assert_allclose(position, whole.position, rtol=0, atol=1e-12)
     np.testing.assert_allclose(velocity, whole.velocity, rtol=0, atol=1e-9)
+
+
+@given(packings(), pressures(), periods, starts, st.integers(0, 199))
+def test_continuing_equals_going_on(parameters, pressure, period, start, cut):
+    """A run cut at any sample and continued from its end is the same to the last digit."""
+    cut %= pressure.size
+    valve = Valve(AREA, travel=TRAVEL)
+    whole = simulate(valve, parameters, pressure, period, start)
+    head = simulate(valve, parameters, pressure[: cut + 1], period, start)
+    tail = simulate(valve, parameters, pressure[cut:], period, head.end)
+    np.testing.assert_array_equal(np.append(head.position[:-1], tail.position), whole.position)
+    np.testing.assert_array_equal(np.append(head.velocity[:-1], tail.velocity), whole.velocity)

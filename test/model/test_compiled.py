@@ -10,9 +10,10 @@
 """Kernels are compiled anew when they must be, and run where nothing can be cached."""
 
 import os
+import subprocess
+import sys
 
 import pytest
-from processes import printed
 
 INNER = """
 from valve_friction_ros.model.compiled import compiled
@@ -51,7 +52,16 @@ def kernels(tmp_path):
 def told(folder, *words, **variables):
     """What a new process of Python prints."""
     environment = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
-    return printed("-B", *words, cwd=folder, env=environment | variables)
+    found = subprocess.run(
+        [sys.executable, "-B", *words],
+        cwd=folder,
+        env=environment | variables,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert found.returncode == 0, found.stderr
+    return found.stdout
 
 
 def run(folder, **variables):
@@ -69,7 +79,6 @@ def test_a_change_of_a_kernel_that_another_one_calls(kernels):
     assert run(kernels) == (2, True)
 
 
-@pytest.mark.slow
 def test_a_kernel_out_of_the_cache_serves_one_that_is_compiled(kernels):
     """What numba needs to compile is not loaded with the first."""
     (kernels / "inner.py").write_text(ARRAYS)

@@ -186,6 +186,22 @@ def test_first_turn(case):
         assert math.copysign(1.0, start) * found >= -open_part
 
 
+def test_first_turn_closed_forms():
+    # Undamped, h = sin(ωt)/ω: a·cos + (j/ω)·sin is first zero at ωt = π/4 for j = −a·ω,
+    # at 3π/4 for j = +a·ω, at π/2 for j = 0.
+    assert first_turn(3.0, -6.0, 0.0, 4.0) == pytest.approx(math.pi / 8, rel=8 * EPS, abs=0)
+    assert first_turn(3.0, 6.0, 0.0, 4.0) == pytest.approx(3 * math.pi / 8, rel=8 * EPS, abs=0)
+    assert first_turn(3.0, 0.0, 0.0, 4.0) == pytest.approx(math.pi / 4, rel=8 * EPS, abs=0)
+    # Free mass: a + j·t.
+    assert first_turn(3.0, -6.0, 0.0, 0.0) == 0.5
+    assert first_turn(3.0, 6.0, 0.0, 0.0) == math.inf
+    # No spring: a·e^−ct + j·(1 − e^−ct)/c with a = 1, j = −1, c = 1 is zero at ln 2.
+    assert first_turn(1.0, -1.0, 1.0, 0.0) == pytest.approx(math.log(2), rel=8 * EPS, abs=0)
+    # Critical, c = 2, ω₀ = 1: a·(1 − t) + j·t.
+    assert first_turn(1.0, -2.0, 2.0, 1.0) == pytest.approx(1 / 3, rel=8 * EPS, abs=0)
+    assert first_turn(1.0, 2.0, 2.0, 1.0) == math.inf
+
+
 def convolution_series(c, s):
     """h ∗ h at time 1 by its Taylor series, which that of h drives."""
     reach = c + math.sqrt(s)

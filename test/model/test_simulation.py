@@ -10,6 +10,7 @@
 """Simulation of the Karnopp model against closed forms."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -18,8 +19,10 @@ from valve_friction_ros.model import (
     BENCH_VALVE,
     GRAPHITE_PACKING,
     GRAPHITE_VALVE,
+    HIGH_FRICTION,
     LOW_FRICTION,
     KarnoppParameters,
+    SineWave,
     StemState,
     TriangleWave,
     Valve,
@@ -69,6 +72,22 @@ class TestClosedForms:
         np.testing.assert_allclose(found.position, time**3 / 6, rtol=20 * EPS)
         np.testing.assert_allclose(found.velocity, time**2 / 2, rtol=20 * EPS)
 
+    def test_viscous_decay(self):
+        """The 39 µs of the bench valve with high friction, stepped by 1 ms."""
+        mass, viscous, speed = 1.75, 4.48e4, 0.01
+        parameters = packing(mass=mass, viscous=viscous)
+        found = simulate(FREE, parameters, constant(0.0, 20), 1e-3, StemState(0.0, speed))
+        rate = viscous / mass
+        time = 1e-3 * np.arange(20)
+        # Velocity and position are sums of terms as large as they would be without friction.
+        expected = speed * np.exp(-rate * time)
+        np.testing.assert_allclose(found.velocity, expected, rtol=0, atol=4 * EPS * speed)
+        assert (found.velocity >= 0).all()
+        expected = -speed * np.expm1(-rate * time) / rate
+        np.testing.assert_allclose(
+            found.position, expected, rtol=0, atol=4 * EPS * speed / rate * 8
+        )
+
     def test_coulomb_friction_takes_the_same_off_each_swing(self):
         """Each half swing is a cosine about ±F_c/k, so its end is 2·F_c/k nearer to zero."""
         mass, spring, coulomb, start = 2.0, 800.0, 10.0, 0.31
@@ -114,6 +133,25 @@ class TestClosedForms:
             expected = np.where(speed > 0.1, speed, 0.0) if rests else speed
             np.testing.assert_allclose(found.velocity, expected, rtol=0, atol=1000 * EPS)
 
+    def test_the_bench_valve_rests_earlier_with_a_limit_velocity(self):
+        """On the upstroke of a sine, whose end the stem reaches ever slower.
+
+        It pulls F_c + F_v·ẋ there, which F_s holds at any speed below 277/70500 m/s.
+        """
+        pressure = SineWave(period=4.0).sample(SAMPLE_PERIOD * np.arange(3000))
+        last, speeds = [], []
+        for limit in (0.0, 1e-4, 1e-3):
+            parameters = replace(GRAPHITE_PACKING, limit_velocity=limit)
+            velocity = simulate(GRAPHITE_VALVE, parameters, pressure, SAMPLE_PERIOD).velocity
+            begin = int(np.argmax(velocity > 0))
+            last.append(begin + int(np.argmax(velocity[begin:] <= 0)) - 1)
+            speeds.append(velocity[last[-1]])
+            assert velocity[last[-1] + 1] == 0
+        assert last[0] > last[1] > last[2]
+        assert speeds[0] > 0
+        assert 1e-3 > speeds[1] > 1e-4
+        assert speeds[2] > 1e-3
+
 
 class TestSlipJump:
     def test_viscous_stem_jumps_onto_the_sliding_line(self):
@@ -140,6 +178,14 @@ class TestSlipJump:
         due = p.static_friction / (0.0445 * rate) / SAMPLE_PERIOD
         assert first - 1 <= due < first
 
+    def test_undamped_stem_overshoots_to_twice_the_jump(self):
+        """From the breakaway at pull it swings by 2·(pull − F_c)/k and rests there."""
+        spring, coulomb, static, pull = 1000.0, 20.0, 30.0, 30.0 + 1e-6
+        parameters = packing(mass=3.0, spring=spring, coulomb=coulomb, static=static)
+        found = simulate(FREE, parameters, constant(pull, 1000), 1e-3, StemState(0.0))
+        assert found.velocity[-1] == 0
+        assert found.position[-1] == pytest.approx(2 * (pull - coulomb) / spring, rel=1e-12)
+
     def test_stick_slip_limit_cycle(self):
         """A slow ramp moves an undamped stem in equal jumps of 2·(F_s − F_c)/k.
 
@@ -156,6 +202,14 @@ class TestSlipJump:
         share = rate * math.pi * math.sqrt(1.0 / spring) / (2 * (static - coulomb))
         jump = 2 * (static - coulomb) / spring
         np.testing.assert_allclose(np.diff(levels), jump, rtol=2 * share)
+
+    @pytest.mark.parametrize("p", [LOW_FRICTION, HIGH_FRICTION])
+    def test_no_jump_where_static_is_coulomb_friction(self, p):
+        pressure = 8e4 + 2.0 * np.arange(20001)
+        velocity = simulate(BENCH_VALVE, p, pressure, SAMPLE_PERIOD).velocity
+        # The speed of the sliding line is approached from below.
+        assert (np.diff(velocity) >= -1e-15).all()
+        assert velocity[-1] == pytest.approx(0.0445 * 2000.0 / p.spring_constant, rel=1e-9)
 
 
 class TestTravelStops:

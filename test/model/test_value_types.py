@@ -18,6 +18,7 @@ from scipy.signal import dlsim
 
 from valve_friction_ros.model import (
     BENCH_VALVE,
+    DEFAULT_LAG,
     GRAPHITE_PACKING,
     HIGH_FRICTION,
     LOW_FRICTION,
@@ -214,6 +215,12 @@ class TestWaves:
         np.testing.assert_allclose(found, expected, rtol=4 * EPS)
 
     @pytest.mark.parametrize("kind", WAVES)
+    def test_defined_before_the_start(self, kind):
+        wave = kind(low=0.0, high=1.0, period=4.0)
+        time = np.linspace(0.05, 3.95, 40)
+        np.testing.assert_allclose(wave.sample(time - 8.0), wave.sample(time), atol=1e-14)
+
+    @pytest.mark.parametrize("kind", WAVES)
     @pytest.mark.parametrize("low", [2.0, 1.0])
     def test_refuses_levels_without_height(self, kind, low):
         with pytest.raises(ValueError, match=r"^low \(\d\) must be below high \(1\)"):
@@ -305,6 +312,15 @@ class TestEveryExcitation:
 
 
 class TestConverter:
+    def test_step_gives_an_exponential(self):
+        period, lag, step = 1e-3, DEFAULT_LAG, 500
+        command = np.where(np.arange(6000) < step, 6e4, 1.6e5)
+        since = period * np.maximum(np.arange(6000) - step, 0)
+        expected = 1.6e5 - 1e5 * np.exp(-since / lag)
+        found = converter_response(command, period, lag)
+        # One rounding a sample, which the filter forgets with its lag of 1300 samples.
+        np.testing.assert_allclose(found, expected, rtol=1300 * EPS)
+
     def test_any_command_as_scipy_steps_it(self):
         period, lag = 0.02, 0.3
         command = np.random.default_rng(0).uniform(4e4, 2e5, 400)
@@ -319,6 +335,14 @@ class TestConverter:
         found = converter_response(np.full(3, 7e4), 1.0, 1.0, initial=5e4)
         expected = 7e4 - 2e4 * np.exp([0.0, -1.0, -2.0])
         np.testing.assert_allclose(found, expected, rtol=4 * EPS)
+
+    def test_blocks_equal_one_call(self):
+        """A block that begins at the sample where the last one ended goes on from there."""
+        command = SquareWave(period=1.0).sample(1e-3 * np.arange(3000))
+        whole = converter_response(command, 1e-3)
+        head = converter_response(command[:1201], 1e-3)
+        tail = converter_response(command[1200:], 1e-3, initial=head[-1])
+        np.testing.assert_allclose(np.append(head, tail[1:]), whole, rtol=4 * EPS)
 
     def test_refusals(self):
         with pytest.raises(ValueError, match=r"^sample_period must be above zero"):

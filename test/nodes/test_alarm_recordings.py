@@ -121,7 +121,6 @@ def test_an_alarm_is_recorded_and_the_whole_takes_the_place_of_its_first_part(li
     assert kept.message.startswith("excess friction")
 
 
-@pytest.mark.slow
 def test_what_was_before_an_alarm_outlives_a_kill(live, history):
     """Killed before the time after the rise is over; what a kill left is neither half nor lost."""
     node = baseline_set(live, {"alarm_recording": 600.0})
@@ -267,7 +266,6 @@ def test_what_is_not_recorded(live, tmp_path):
     assert not (tmp_path / "valve_friction_ros" / "alarms").exists()
 
 
-@pytest.mark.slow
 def test_a_fault_in_the_page_is_told_as_that_and_the_bag_is_there(live):
     baseline_set(live, {}, script=faulty("pageless")).forgive_tracebacks()
     client = live.client

@@ -55,7 +55,6 @@ USAGE = (  # of which a kill may cost the last minute
 AGE = re.compile(r" \(identified \d+ (s|min) ago, before the restart\)")
 
 
-@pytest.mark.slow
 def test_an_alarm_outlives_a_kill(live):
     node = live.start_identifier()
     client = live.client
@@ -122,7 +121,7 @@ def test_stamps_of_a_time_to_come(live, history, tmp_path):
     assert AGE.search(status.message)
 
 
-@pytest.mark.parametrize("gone", ["removed", pytest.param("replaced", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("gone", ["removed", "replaced"])
 def test_a_history_that_goes_while_the_node_runs_costs_no_baseline(live, history, gone):
     node = live.start_identifier()
     client = live.client
@@ -191,7 +190,6 @@ def test_a_node_without_a_history_says_so_and_keeps_nothing(live, history):
     assert not history.path.exists()
 
 
-@pytest.mark.slow
 def test_the_baseline_is_guarded_and_restored(live, history):
     client = live.client_of_identifier()
     assert client.refusal("restore_baseline").startswith("there is no ~/set_baseline to undo")

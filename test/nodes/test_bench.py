@@ -302,7 +302,6 @@ def last(live):
     return live.set_points[-1].fluid_pressure if live.set_points else None
 
 
-@pytest.mark.slow
 def test_it_plays_when_asked_and_goes_back_by_limit_and_by_its_end(stroke_player):
     live = stroke_player
     assert not live.client.trigger("start", PLAYER).success  # no signal has come

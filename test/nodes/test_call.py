@@ -9,14 +9,16 @@
 
 """The sub-command `call`: services of a live node without the command `ros2`."""
 
+import os
 import signal
+import subprocess
+import sys
 import time
 from pathlib import Path
 
 import pytest
 from faulty_identifier import faulty
-from live_nodes import NAMESPACE
-from prepared import command
+from live_nodes import NAMESPACE, PROJECT
 from records import quick_record
 
 from valve_friction_ros.model import HIGH_FRICTION
@@ -24,17 +26,29 @@ from valve_friction_ros.model import HIGH_FRICTION
 
 def start(domain, *arguments):
     """Start the command in a domain."""
-    return command("call", *arguments, ROS_DOMAIN_ID=str(domain.number))
+    path = os.pathsep.join(filter(None, [str(PROJECT), os.environ.get("PYTHONPATH")]))
+    return subprocess.Popen(
+        [sys.executable, "-m", "valve_friction_ros", "call", *arguments],
+        env=os.environ | {"ROS_DOMAIN_ID": str(domain.number), "PYTHONPATH": path},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def ended(process):
+    """Exit code, stdout and stderr."""
+    out, err = process.communicate(timeout=300)
+    return process.returncode, out, err
 
 
 @pytest.fixture(scope="module")
 def bench(shared):
     """Function of arguments: exit code, stdout and stderr of the command beside an identifier."""
     shared.start_identifier()
-    return shared.client, lambda *arguments: start(shared.domain, *arguments).ended()
+    return shared.client, lambda *arguments: ended(start(shared.domain, *arguments))
 
 
-@pytest.mark.slow
 def test_all_services(bench):
     client, call = bench
     assert call("fv_101", "clear") == (
@@ -93,7 +107,7 @@ def busy(live):
 
 
 def test_the_timeout_ends_the_command_and_the_node_goes_on(busy):
-    assert start(busy.domain, NAMESPACE, "identify", "--timeout", "3").ended() == (
+    assert ended(start(busy.domain, NAMESPACE, "identify", "--timeout", "3")) == (
         2,
         "",
         "valve_friction call: /fv_101/identifier/identify has not answered within 3 s; it is "
@@ -117,7 +131,7 @@ def waiting(bench):
 def test_interrupted_while_it_waits(busy):
     process = waiting(busy)
     process.send_signal(signal.SIGINT)
-    assert process.ended() == (
+    assert ended(process) == (
         130,
         "",
         "valve_friction call: interrupted: the identifier continues the task it has started\n",
@@ -127,7 +141,7 @@ def test_interrupted_while_it_waits(busy):
 def test_the_node_ends_meanwhile(busy):
     process = waiting(busy)
     busy.nodes[0].stop()
-    assert process.ended() == (
+    assert ended(process) == (
         2,
         "",
         "valve_friction call: /fv_101/identifier ended before it answered\n",
@@ -135,6 +149,6 @@ def test_the_node_ends_meanwhile(busy):
 
 
 def test_nobody_is_there(live):
-    code, out, err = start(live.domain, "/fv_101", "identify", "--timeout", "1").ended()
+    code, out, err = ended(start(live.domain, "/fv_101", "identify", "--timeout", "1"))
     assert (code, out) == (2, "")
     assert "there is no identifier at all: start one, or set its ROS_DOMAIN_ID" in err

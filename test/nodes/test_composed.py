@@ -135,7 +135,7 @@ def test_identifier_works_in_each_executor_of_rclpy(live, compose, kind):
         converse(live.client)
 
 
-@pytest.mark.parametrize("kind", ["single", pytest.param("turns", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("kind", ["single", "turns"])
 def test_identifier_works_where_rclpy_offers_no_way_behind_it(live, compose, kind, monkeypatch):
     """As on a version of rclpy whose private calls have gone: messages come by callbacks."""
     for module in (polled_node, polled_subscription):
@@ -210,7 +210,6 @@ def state(client):
     return client.call(GetState, f"{NODE}/get_state", GetState.Request()).current_state.id
 
 
-@pytest.mark.slow
 def test_life_cycle(live, compose):
     """Unconfigured: nothing; inactive: it refuses; active: it works; all of it twice."""
     client = live.client

@@ -45,7 +45,6 @@ TAG = "<img src=x onerror=alert(1)>"
 VALVE = f"/valve?node={quote(NODE)}"
 SILENCE = 8.0
 """Long enough for a slow machine."""
-MANY = 250
 PLANT = Path(__file__).parents[1] / "support" / "simulated_plant.py"
 
 
@@ -142,7 +141,7 @@ def test_a_letter_of_ne_107_filters_and_an_empty_table_says_so(tab):
 
 
 def test_only_what_changes_is_sent(tab):
-    """A table is not built anew each second: the frames of two seconds are small."""
+    """A table is not built anew each second: the frames of three seconds are small."""
     page = tab.page
     frames = []
 
@@ -152,11 +151,11 @@ def test_only_what_changes_is_sent(tab):
     page.on("websocket", listen)
     tab.open("/")
     wait_for_rows(page, 10)
-    page.wait_for_timeout(1000)
+    page.wait_for_timeout(1500)
     frames.clear()
-    page.wait_for_timeout(2000)
+    page.wait_for_timeout(3000)
     assert frames
-    assert sum(frames) < 2000  # ten rows take more than 5,000
+    assert sum(frames) < 3000  # ten rows take more than 5,000
 
 
 def test_a_zone_and_a_theme_are_in_the_address(tab):
@@ -183,19 +182,18 @@ def test_keys_alone_lead_to_a_valve(tab):
     page.wait_for_selector(".vf-valve")
 
 
+@pytest.mark.parametrize("theme", ["light", "dark"])
 @pytest.mark.parametrize(
     "path", ["/", "/?view=tiles", "/alarms", "/alarms?view=events", VALVE, "/compare"]
 )
-def test_a_page_fits_its_window_and_axe_finds_nothing_wrong(tab, path):
-    """In each width by day, and by night with the other colours."""
+def test_a_page_fits_its_window_and_axe_finds_nothing_wrong(tab, path, theme):
     join = "&" if "?" in path else "?"
-    for theme, widths in (("light", (2560, 1400, 390)), ("dark", (390,))):
-        page = tab.open(f"{path}{join}theme={theme}")
-        page.wait_for_selector(".vf-row, .vf-tile, .vf-valve, .vf-compare, .vf-alarms")
-        for width in widths:
-            page.set_viewport_size({"width": width, "height": 900})
-            page.wait_for_function("document.documentElement.scrollWidth <= innerWidth")
-            assert axe_violations(page) == []
+    page = tab.open(f"{path}{join}theme={theme}")
+    page.wait_for_selector(".vf-row, .vf-tile, .vf-valve, .vf-compare, .vf-alarms")
+    for width in (2560, 1400, 390):
+        page.set_viewport_size({"width": width, "height": 900})
+        page.wait_for_function("document.documentElement.scrollWidth <= innerWidth")
+        assert axe_violations(page) == []
 
 
 # Text from outside
@@ -401,21 +399,23 @@ def test_two_identifications_are_compared(identified, tab):
     page.locator(".vf-compared").get_by_text("FV-103").first.wait_for()
 
 
-def test_axe_finds_nothing_wrong_with_what_is_known_of_a_valve(identified, tab):
+@pytest.mark.usefixtures("identified")
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_axe_finds_nothing_wrong_with_what_is_known_of_a_valve(tab, theme):
     """Parameters, trend, identifications, a dialog and a comparison."""
-    assert identified.client.trigger("identify").success
-    for theme in ("light", "dark"):
-        page = tab.open(f"{VALVE}&theme={theme}")
-        page.locator(".vf-parameters").wait_for()
-        page.locator(".vf-long tbody tr").first.wait_for()
-        page.evaluate("document.querySelectorAll('details').forEach(one => one.open = true)")
-        assert axe_violations(page) == []
-        page.get_by_role("button", name="Set baseline …").click()
-        page.locator(".vf-dialog").get_by_text("current", exact=True).wait_for()
-        assert axe_violations(page) == []
-        page = tab.open(f"/compare?a={quote(NODE)}&b={quote(NODE)}&theme={theme}")
-        page.locator(".vf-compared").wait_for()
-        assert axe_violations(page) == []
+    page = tab.open(f"{VALVE}&theme={theme}")
+    press(page, "Identify", "Identify: ")
+    page.locator(".vf-parameters").wait_for()
+    page.locator(".vf-long tbody tr").first.wait_for()
+    page.evaluate("document.querySelectorAll('details').forEach(one => one.open = true)")
+    assert axe_violations(page) == []
+    page.get_by_role("button", name="Set baseline …").click()
+    page.locator(".vf-dialog").get_by_text("current", exact=True).wait_for()
+    assert axe_violations(page) == []
+    page.get_by_role("button", name="Cancel").click()
+    page = tab.open(f"/compare?a={quote(NODE)}&b={quote(NODE)}&theme={theme}")
+    page.locator(".vf-compared").wait_for()
+    assert axe_violations(page) == []
 
 
 def test_an_alarm_is_acknowledged_with_a_name_and_exported(identified, tab):
@@ -448,16 +448,6 @@ def test_an_alarm_is_acknowledged_with_a_name_and_exported(identified, tab):
     identified.client.set_parameters(NODE, {"baseline_coulomb_friction": float("nan")})
 
 
-@pytest.fixture(scope="module")
-def many(plant):
-    """Alarms of more valves than a page shows at once."""
-    shown = Condition(Level.ERROR, StatusSignal.FAILURE, "excess friction")
-    for number in range(MANY):
-        valve = KeptValve(f"/many/fv_{number}/identifier", f"MANY-{number}")
-        follow_alarms(plant.history, valve, {AlarmKind.FRICTION_HIGH: shown}, time.time_ns())
-
-
-@pytest.mark.usefixtures("many")
 @pytest.mark.parametrize(
     ("path", "line"),
     [
@@ -466,13 +456,17 @@ def many(plant):
         ("/?q=/many&view=tiles", ".vf-tile"),
     ],
 )
-def test_of_many_those_near_the_view_are_drawn(tab, path, line):
+def test_of_many_those_near_the_view_are_drawn(plant, tab, path, line):
     """All come as the page is scrolled."""
+    shown = Condition(Level.ERROR, StatusSignal.FAILURE, "excess friction")
+    for number in range(400):
+        valve = KeptValve(f"/many/fv_{number}/identifier", f"MANY-{number}")
+        follow_alarms(plant.history, valve, {AlarmKind.FRICTION_HIGH: shown}, time.time_ns())
     page = tab.open(path)
     lines = page.locator(line)
     page.get_by_text("more below").wait_for()
-    assert 0 < lines.count() < MANY
-    while (count := lines.count()) < MANY:
+    assert 0 < lines.count() < 400
+    while (count := lines.count()) < 400:
         page.mouse.wheel(0, 20_000)
         page.wait_for_function(f"document.querySelectorAll('{line}').length > {count}")
     page.get_by_text("more below").wait_for(state="detached")
@@ -528,7 +522,6 @@ def test_an_identifier_that_ends_falls_silent_and_comes_back(plant, tab):
     page.locator(".vf-valve-name .vf-chip").get_by_text("silent").wait_for(state="detached")
 
 
-@pytest.mark.slow
 def test_ctrl_c_ends_it_and_open_pages_heal_when_it_is_back(plant, tab):
     page = tab.open("/?show=error&sort=tag")
     wait_for_simulated_rows(page, 2)

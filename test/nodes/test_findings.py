@@ -98,7 +98,6 @@ HARDLY = SensorNoise(3e-5, 300.0, 3).applied_to(
 CHANGE = "spring_constant change [%]"
 
 
-@pytest.mark.slow
 def test_a_lost_spring_is_said_and_outlives_a_record_that_hardly_shows_it_and_a_kill(live, history):
     client = live.client_of_identifier()
     client.identified(HEALTHY)
@@ -135,7 +134,7 @@ def test_a_lost_spring_is_said_and_outlives_a_record_that_hardly_shows_it_and_a_
     assert values_of(after)[CHANGE] == values[CHANGE]
 
 
-@pytest.mark.parametrize("is_scheduled", [False, pytest.param(True, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("is_scheduled", [False, True])
 def test_lost_travel_is_said_though_its_record_is_refused(live, history, is_scheduled):
     """A sixth of the travel is lost: no model follows the record, but the stem's end is seen."""
     client = live.client_of_identifier()
@@ -162,7 +161,6 @@ def test_lost_travel_is_said_though_its_record_is_refused(live, history, is_sche
     assert after.level == WARN
 
 
-@pytest.mark.slow
 def test_a_restored_baseline_brings_all_its_numbers_back(live):
     client = live.client_of_identifier({"baseline_in_alarm": True})
     client.set_baseline(HEALTHY)

@@ -194,7 +194,6 @@ def sent(client, history):
     )
 
 
-@pytest.mark.slow
 def test_rows_arrive_and_wait_while_the_server_is_away(live, history, database, postgres):
     node = live.start_identifier({"history_url": database.url})
     client = live.client

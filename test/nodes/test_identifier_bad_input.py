@@ -182,7 +182,8 @@ def test_the_log_tells_a_clearing_right_after_a_bad_sample(live):
     )
 
 
-def test_a_record_that_ended_long_ago_is_refused(live):
+@pytest.mark.parametrize("late", ["pressure", "stem"])
+def test_a_record_that_ended_long_ago_is_refused(live, late):
     """By the node's clock, whatever its stamps: of both signals, or of one that fell silent."""
     client = live.client_of_identifier({"use_sim_time": True, "input_timeout": 3.0})
     clock = SimulatedClock(client)
@@ -193,28 +194,30 @@ def test_a_record_that_ended_long_ago_is_refused(live):
             lambda: any(stamp.sec == second for stamp, _ in client.statuses[-2:]), "the time", 0
         )
 
-    for begin, topic in ((1_000, "actuator_pressure"), (2_000, "stem_state")):
-        set_clock(begin)
-        client.identified(RECORD, STAMPS[0] + begin * SECOND)
-        estimate = client.last_values()
-        set_clock(begin + 59)  # within the window
-        assert client.trigger("identify").success
-        set_clock(begin + 224)
-        after = STAMPS[-1] + (begin + 165) * SECOND
-        if topic == "actuator_pressure":
-            client.send_stem(after, RECORD.position[0])
-        else:
-            client.send_pressure(after, RECORD.pressure[0])
-        reason = f"the record is old: its last usable sample of {topic} arrived 224 s ago"
-        client.wait_until(
-            lambda reason=reason: reason in client.trigger("identify").message, reason
-        )
-        status = client.next_status(lambda one: "the record is old" in one.message, "the refusal")
-        shown = values_of(status)
-        assert shown["estimate_valid"] == "false"
-        assert shown["reason"].startswith(reason)
-        assert float(shown["estimate_age [s]"]) == 165.0
-        assert shown["coulomb_friction [N]"] == estimate["coulomb_friction [N]"]
+    set_clock(1_000)
+    client.identified(RECORD)
+    estimate = client.last_values()
+    set_clock(1_059)  # within the window
+    assert client.trigger("identify").success
+    set_clock(1_224)
+    after = STAMPS[-1] + 165 * SECOND
+    if late == "pressure":
+        client.send_stem(after, RECORD.position[0])
+    else:
+        client.send_pressure(after, RECORD.pressure[0])
+    client.wait_until(
+        lambda: client.last_values()["samples_taken"] == str(2 * len(RECORD) + 1), "the sample"
+    )
+    response = client.refusal("identify")
+    topic = {"pressure": "actuator_pressure", "stem": "stem_state"}[late]
+    reason = f"the record is old: its last usable sample of {topic} arrived 224 s ago"
+    assert reason in response
+    status = client.next_status(lambda one: "the record is old" in one.message, "the refusal")
+    shown = values_of(status)
+    assert shown["estimate_valid"] == "false"
+    assert shown["reason"].startswith(reason)
+    assert float(shown["estimate_age [s]"]) == 165.0
+    assert shown["coulomb_friction [N]"] == estimate["coulomb_friction [N]"]
 
 
 def test_a_stamp_within_a_period_of_the_last_costs_its_sample_alone(client):

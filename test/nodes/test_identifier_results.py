@@ -16,7 +16,6 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
 from histories import as_kept
 from live_nodes import (
-    BY_ITSELF,
     NAMESPACE,
     NODE,
     SECOND,
@@ -46,8 +45,7 @@ BIAS = 1.13e-3
 @pytest.fixture(scope="module")
 def bench(shared):
     """Identify two periods of a square wave; return client, core's assessment, answers."""
-    parameters = {"method": "bench", "position_bias": BIAS}
-    client = shared.client_of_identifier(parameters, script=BY_ITSELF)
+    client = shared.client_of_identifier({"method": "bench", "position_bias": BIAS})
     early = client.listen(Float64, f"{NAMESPACE}/identifier/friction/coulomb_friction")
     record = bench_record()
     client.fill(record)

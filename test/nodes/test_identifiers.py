@@ -81,8 +81,7 @@ def identifying_processes(pid):
 @pytest.mark.slow
 def test_processes_identify_and_may_die(live):
     parameters = {"valves": ["fv_101"], "identification_processes": 1, "input_timeout": 600.0}
-    script = ["-m", "valve_friction_ros.nodes.identifiers"]
-    process = live.start("identifiers", parameters, script=script, namespace=None)
+    process = live.start("identifiers", parameters, namespace=None)
     client, record = live.client, quick_record()
     client.connect()
     client.send_record(record, START)

@@ -16,8 +16,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from histories import VALVE
-from live_nodes import NAMESPACE, NODE, OK, SECOND, START, STREAM, WARN, time_of, values_of
-from prepared import command
+from live_nodes import NAMESPACE, NODE, OK, SECOND, START, STREAM, WARN, command, time_of, values_of
 from rclpy.duration import Duration
 from records import quick_record
 from sensor_msgs.msg import JointState
@@ -113,7 +112,6 @@ def test_a_node_that_is_stopped_keeps_all(live, history):
     assert read_usage(history, NODE).total.reversals == 3
 
 
-@pytest.mark.slow
 def test_a_warning_of_a_packing_outlives_a_rest_and_a_restart(live, history):
     """While the valve rests the expected date recedes; only a renewed packing ends the warning."""
     client = live.client_of_identifier({"reversal_limit": 500.0})
@@ -226,7 +224,6 @@ def test_it_adds_up_and_survives_a_kill(live, history):
     assert "the valve is in WARN" in client.refusal("set_baseline")
 
 
-@pytest.mark.slow
 def test_the_newer_of_identification_and_moves_leads_and_is_the_baseline(live, history):
     """A record of 300 N at 22:13 is followed by moves of 300 N, and then by moves of 450 N."""
     packing = replace(
@@ -368,8 +365,8 @@ def test_the_figures_outlive_a_kill(live, history):
     page = Path(client.trigger("report").message).read_text(encoding="utf-8")
     assert "Answer to the command" in page
     assert "latest 6 steps of stem_command, from 2023-11-14 22:13 to 2023-11-14 22:14" in page
-    _, shown, error = command("history", history.path).ended()
-    assert "stem_command: 6 steps, 0 ignored; medians: dead time 1" in shown, error
+    shown = command("history", history.path)
+    assert "stem_command: 6 steps, 0 ignored; medians: dead time 1" in shown.stdout, shown.stderr
     assert client.trigger("reset_usage").success
     client.status_values(lambda one: values_of(one)["moves"] == "0", "a new packing")
     assert client.next_status().level == OK

@@ -14,7 +14,7 @@ import re
 
 import numpy as np
 import pytest
-from live_nodes import NODE, SECOND, WARN, SimulatedClock, buffered, stamp_of, values_of
+from live_nodes import NAMESPACE, NODE, SECOND, WARN, SimulatedClock, buffered, stamp_of, values_of
 from rcl_interfaces.msg import ParameterType
 from records import quick_record, simulated
 from std_msgs.msg import Float64MultiArray
@@ -27,6 +27,7 @@ from valve_friction_ros.identification import (
 )
 from valve_friction_ros.model import BENCH_VALVE, HIGH_FRICTION, TriangleWave
 
+NODES = ("identifier", "simulator", "pressure_source")
 OF_ROS = re.compile(r"use_sim_time|start_type_description_service|qos_overrides\..*")
 CHECKED_BY_RULE = {  # floating parameters that may be infinite or not given, so have no range
     "travel": -0.01,
@@ -99,10 +100,13 @@ def range_of(descriptor):
     return (ranges[0].from_value, ranges[0].to_value) if ranges else None
 
 
-def test_every_parameter_is_described_with_its_unit_and_its_range(client):
-    names = [name for name in client.parameter_names(NODE) if not OF_ROS.fullmatch(name)]
+@pytest.mark.parametrize("name", NODES)
+def test_every_parameter_is_described_with_its_unit_and_its_range(live, name):
+    live.start(name)
+    client, node = live.client, f"{NAMESPACE}/{name}"
+    names = [name for name in client.parameter_names(node) if not OF_ROS.fullmatch(name)]
     assert len(names) >= 10
-    for descriptor in client.describe(NODE, names):
+    for descriptor in client.describe(node, names):
         assert re.search(r"\w.*\[[^\]]+\]", descriptor.description), (
             f"{descriptor.name}: no unit in {descriptor.description!r}"
         )
@@ -115,14 +119,16 @@ def test_every_parameter_is_described_with_its_unit_and_its_range(client):
             assert limits[0] < limits[1]
 
 
-def test_bad_changes_are_refused_with_the_rule(client):
-    names = {name for changes, _ in BAD_CHANGES for name in changes}
-    before = client.parameters(NODE, *names)
-    for changes, words in BAD_CHANGES:
-        result = client.set_together(NODE, changes)
-        assert not result.successful, changes
-        assert words in result.reason, changes
-    assert str(client.parameters(NODE, *names)) == str(before)
+@pytest.mark.parametrize(
+    ("changes", "words"), BAD_CHANGES, ids=["-".join(map(str, c.items())) for c, _ in BAD_CHANGES]
+)
+def test_bad_change_is_refused_with_the_rule(client, changes, words):
+    before = client.parameters(NODE, *changes)
+    result = client.set_together(NODE, changes)
+    assert not result.successful
+    assert words in result.reason
+    after = client.parameters(NODE, *changes)
+    assert [str(value) for value in after] == [str(value) for value in before]
 
 
 def test_good_changes_take_effect_and_unrelated_parameters_stay_settable(client):
@@ -179,7 +185,7 @@ def test_a_signature_is_identified(client):
 
 
 def test_former_names_are_understood(client):
-    for former, used in (("refined", "bench"), ("best", "plant")):
+    for former, used in (("robust", "plant"), ("refined", "bench"), ("best", "plant")):
         assert client.set_together(NODE, {"method": former}).successful
         client.identified(quick_record())
         assert values_of(client.next_status())["method"] == used

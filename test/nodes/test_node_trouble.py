@@ -274,7 +274,6 @@ def stuck(live, tmp_path, systemd):
     return process, tmp_path / BLOCK
 
 
-@pytest.mark.slow
 def test_a_loop_that_stands_still(live, systemd, stuck):
     process, block = stuck
     client = live.client
@@ -300,9 +299,7 @@ def test_a_loop_that_stands_still(live, systemd, stuck):
     assert "STOPPING=1" in systemd.heard()
 
 
-@pytest.mark.parametrize(
-    "number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)]
-)
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_stuck_node_ends_all_the_same(live, stuck, number):
     process, block = stuck
     block.touch()
@@ -317,7 +314,6 @@ def test_a_stuck_node_ends_all_the_same(live, stuck, number):
     assert "in poll_when_free" in process.errors
 
 
-@pytest.mark.slow
 def test_an_identification_that_does_not_return(live, tmp_path, systemd):
     process = live.start_identifier({"identification_limit": 1.0}, script=faulty("slow"))
     client = live.client
@@ -369,8 +365,8 @@ def frozen_end(live, tmp_path, what):
     ("what", "where"),
     [
         (LOOP, "in _run"),
-        pytest.param(MIDDLEWARE, "in _end_if_the_middleware_hangs", marks=pytest.mark.slow),
-        pytest.param(CLEAN_UP, "in _run_until", marks=pytest.mark.slow),
+        (MIDDLEWARE, "in _end_if_the_middleware_hangs"),
+        (CLEAN_UP, "in _run_until"),
     ],
 )
 def test_a_process_that_is_frozen_within_c_ends_by_itself(live, tmp_path, what, where):
@@ -381,7 +377,6 @@ def test_a_process_that_is_frozen_within_c_ends_by_itself(live, tmp_path, what, 
         assert lasted < WITHIN + 1.0
 
 
-@pytest.mark.slow
 def test_silent_inputs_alone_end_nothing(live):
     """The middleware is asked several times, and answers."""
     process = live.start("identifier", script=faulty("frozen"))

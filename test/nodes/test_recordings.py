@@ -22,8 +22,7 @@ import numpy as np
 import pytest
 import yaml
 from faulty_identifier import FINISH, FULL, SLOW, faulty
-from live_nodes import NAMESPACE, NODE, SECOND, STREAM, SimulatedClock, stamp_of, stamps_of
-from prepared import command
+from live_nodes import NAMESPACE, NODE, SECOND, STREAM, SimulatedClock, command, stamp_of, stamps_of
 from rclpy.duration import Duration
 from records import quick_record
 from rosbags.rosbag2 import Reader
@@ -49,9 +48,9 @@ class Run(NamedTuple):
 
 def identified(*arguments):
     """The one JSON object of the command, run as a person would."""
-    code, out, error = command("identify", "--json", *arguments).ended()
-    assert (code, error) == (0, "")
-    return json.loads(out)
+    done = command("identify", "--json", *arguments)
+    assert (done.returncode, done.stderr) == (0, "")
+    return json.loads(done.stdout)
 
 
 def numbers_of(answer):

@@ -20,7 +20,6 @@ import pytest
 import yaml
 from live_nodes import NAMESPACE, NODE, PROJECT, Domain, NodeProcess, values_of
 from local_server import free_port
-from processes import ran
 
 from valve_friction_ros.records.files import data_folder
 
@@ -272,9 +271,17 @@ def test_diagnostics_say_that_it_prepares(live, tmp_path):
 def python(code, *arguments, **environment):
     """What a Python of its own prints."""
     bare = {key: value for key, value in os.environ.items() if key != "OPENBLAS_NUM_THREADS"}
-    found, out, error = ran(*arguments, program=["-c", code], cwd=PROJECT, env=bare | environment)
-    assert (found, error) == (0, "")
-    return out
+    done = subprocess.run(
+        [sys.executable, "-c", code, *arguments],
+        cwd=PROJECT,
+        env=bare | environment,
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=300,
+    )
+    assert done.stderr == ""
+    return done.stdout
 
 
 @pytest.mark.parametrize("given", ["-p", "fv_101", "--params-file"])

@@ -14,8 +14,7 @@ import re
 
 import numpy as np
 import pytest
-from live_nodes import PROJECT
-from processes import ran
+from live_nodes import PROJECT, command
 
 LIBRARIES = ("apsw", "backports", "lz4", "rosbags")
 LINE = re.compile(
@@ -58,13 +57,13 @@ def test_csv_is_identified_and_a_bag_is_refused(loose_record, bench_yaml, tmp_pa
     file = tmp_path / "record.csv"
     np.savetxt(file, columns, "%.12g", ",", header="time_s,pressure_pa,position_m", comments="")
     options = ("--valve", bench_yaml, "--method", "published")
-    code, _, error = ran("identify", file, *options)
-    assert code == 0, error
+    done = command("identify", file, *options)
+    assert done.returncode == 0, done.stderr
     bag = tmp_path / "bag.mcap"
     bag.write_bytes(b"\x89MCAP0\r\n")
-    code, _, error = ran("identify", bag, *options)
-    assert code == 2
-    assert LINE.fullmatch(error.strip().removeprefix("valve_friction identify: "))
+    done = command("identify", bag, *options)
+    assert done.returncode == 2
+    assert LINE.fullmatch(done.stderr.strip().removeprefix("valve_friction identify: "))
 
 
 def test_a_folder_tells_which_are_bags(bench_yaml, tmp_path):
@@ -72,6 +71,6 @@ def test_a_folder_tells_which_are_bags(bench_yaml, tmp_path):
     folder.mkdir()
     (folder / "bag.mcap").write_bytes(b"\x89MCAP0\r\n")
     output = tmp_path / "rows.csv"
-    code, _, error = ran("identify-folder", folder, "--valve", bench_yaml, "--output", output)
-    assert code == 2, error
+    done = command("identify-folder", folder, "--valve", bench_yaml, "--output", output)
+    assert done.returncode == 2, done.stderr
     assert LINE.search(output.read_text())

@@ -12,12 +12,14 @@
 import os
 import pickle
 import signal
+import subprocess
+import sys
 import threading
 import time
 from pathlib import Path
 
 import pytest
-from processes import PATIENCE, ran, wait_until
+from waiting import PATIENCE, wait_until
 
 from valve_friction_ros.health import (
     RefusedRecordError,
@@ -115,9 +117,11 @@ def test_it_ends_with_its_parent_though_it_works():
         "while made._free: time.sleep(0.01)\n"
         "os.kill(os.getpid(), 9)\n"
     )
-    end, out, _ = ran(program=["-c", code])
-    assert end == -signal.SIGKILL
-    wait_until(lambda: not is_running(int(out)))
+    parent = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=PATIENCE
+    )
+    assert parent.returncode == -signal.SIGKILL
+    wait_until(lambda: not is_running(int(parent.stdout)))
 
 
 def is_running(process):

@@ -254,7 +254,7 @@ ASKED = {
 """Exports that do not say their units, what a column is, or whether day or month is first."""
 
 
-@pytest.fixture(scope="module", params=[1, pytest.param(2, marks=pytest.mark.slow)])
+@pytest.fixture(scope="module", params=[1, 2])
 def outcomes(request, tmp_path_factory):
     pytest.importorskip("openpyxl")
     pytest.importorskip("pyarrow")

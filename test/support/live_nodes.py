@@ -18,11 +18,9 @@ import time
 from pathlib import Path
 
 import numpy as np
-import prepared
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray
 from extension.diagnostic_keys import is_explained
-from processes import PATIENCE
 from rcl_interfaces.srv import (
     DescribeParameters,
     GetParameters,
@@ -37,6 +35,7 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import FluidPressure, JointState
 from std_msgs.msg import Float64, Float64MultiArray
 from std_srvs.srv import Trigger
+from waiting import PATIENCE
 
 from benchmark.harness.run import Participant
 
@@ -45,9 +44,6 @@ NAMESPACE = "/fv_101"
 NODE = f"{NAMESPACE}/identifier"
 OK, WARN, ERROR = b"\x00", b"\x01", b"\x02"
 """Levels of a diagnostic."""
-BY_ITSELF = ["-m", "valve_friction_ros.nodes.identifier"]
-"""Script of an identifier that is started as a person starts it."""
-_LIBRARIES = os.environ.get("PYTHONPATH")
 _REPEAT = 5.0
 """Time until a service is called again, s."""
 SECOND = 1_000_000_000
@@ -88,11 +84,7 @@ class Domain:
 
 
 class NodeProcess:
-    """A node; what it keeps goes into the test's folder.
-
-    A node of `prepared.NODES` is a fork of a process that is prepared, unless its script begins
-    with -m or the environment asks for other libraries.
-    """
+    """A node, started as a person would start it; what it keeps goes into the test's folder."""
 
     def __init__(
         self, name, domain, folder, parameters=None, arguments=(), script=None, namespace=NAMESPACE
@@ -100,30 +92,20 @@ class NodeProcess:
         self.name = f"{namespace or ''}/{name}"
         self._output = folder / f"{name}-{time.monotonic_ns()}.out"
         self._errors = self._output.with_suffix(".err")
+        script = ["-m", f"valve_friction_ros.nodes.{name}"] if script is None else script
+        what = script if isinstance(script, list) else [str(script)]
         place = [] if namespace is None else ["-r", f"__ns:={namespace}"]
-        given = ["--ros-args", *place, *arguments]
+        command = [sys.executable, *what, "--ros-args", *place, *arguments]
         for key, value in (parameters or {}).items():
-            given += ["-p", f"{key}:={value}"]
+            command += ["-p", f"{key}:={value}"]
         path = os.pathsep.join(filter(None, [str(PROJECT), os.environ.get("PYTHONPATH")]))
         environment = os.environ | {"ROS_DOMAIN_ID": str(domain.number), "PYTHONPATH": path}
         environment["ROS_HOME"] = str(folder)
         environment.pop("PYTEST_CURRENT_TEST", None)  # NiceGUI behaves otherwise within a test
-        words = [name] if script is None else script if isinstance(script, list) else [str(script)]
-        is_usual = name in prepared.NODES and os.environ.get("PYTHONPATH") == _LIBRARIES
         with self._output.open("w") as output, self._errors.open("w") as errors:
-            if is_usual and words[0] != "-m":
-                files = [output.fileno(), errors.fileno()]
-                self._process = prepared.forked([*words, *given], files, folder, environment)
-            else:
-                if script is None:
-                    words = ["-m", f"valve_friction_ros.nodes.{name}"]
-                self._process = subprocess.Popen(
-                    [sys.executable, *words, *given],
-                    cwd=folder,
-                    env=environment,
-                    stdout=output,
-                    stderr=errors,
-                )
+            self._process = subprocess.Popen(
+                command, cwd=folder, env=environment, stdout=output, stderr=errors
+            )
         self._has_stopped = False
         self._may_show_tracebacks = False
 
@@ -471,6 +453,18 @@ class Client(Participant):
         request = SetParametersAtomically.Request(parameters=_parameter_messages(values))
         name = f"{node}/set_parameters_atomically"
         return self.call(SetParametersAtomically, name, request).result
+
+
+def command(*arguments):
+    """Run the command as a person would; how it ended, and what it said."""
+    return subprocess.run(
+        [sys.executable, "-m", "valve_friction_ros", *map(str, arguments)],
+        cwd=PROJECT,
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
 
 
 class SimulatedClock:
