@@ -80,8 +80,7 @@ class Code(Enum):
     NO_ESTIMATE = "no estimate: {reason}"
     NOTHING_IDENTIFIED = "nothing has been identified yet"
     REFUSED = "the latest identification was refused: {reason}; previous result: {of}"
-    REFUSED_REPEATEDLY = "the latest {count} identifications were refused: {reason}"
-    REFUSED_IN_A_ROW = "the latest {count} identifications were refused"
+    REFUSED_REPEATEDLY = "the latest {count} identifications were refused{reason:after : }"
     MEASURED_EARLIER = "{of} (measured {time:minute}; not seen in any record since)"
     # Parts
     FRICTION = "{of:words}"

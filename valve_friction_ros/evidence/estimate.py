@@ -53,7 +53,7 @@ from valve_friction_ros.identification.trust.verdict import (
     with_verdict,
 )
 from valve_friction_ros.model.valve import Valve
-from valve_friction_ros.wording import percentage
+from valve_friction_ros.wording import numbered, percentage
 
 
 @dataclass(frozen=True, eq=False)
@@ -444,7 +444,7 @@ def _change(split: Split, origin: int, lag: float) -> FrictionChange:
 def _too_few(moves: Moves, has_changed: bool) -> str:
     up, down = (int(np.sum(moves.direction == way)) for way in (1, -1))
     blocks = len(set(blocks_of(moves, MOST_BLOCKS).tolist()))
-    some = f"{blocks} block{'s' * (blocks != 1)} of time"
+    some = f"{numbered(blocks, 'block')} of time"
     since = " since friction changed" if has_changed else ""
     return (
         f"{up} moves up and {down} down in {some}{since}: {FEWEST_MOVES} of each "

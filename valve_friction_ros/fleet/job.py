@@ -161,8 +161,8 @@ class _Alarms:
         }
         self._hold = FrictionHold(shown, None if last is None else last.time)
 
-    def follow(self, diagnosis: Diagnosis, filing: Filing) -> None:
-        """Take the diagnosis of a filed record, dated at the end of the record."""
+    def follow(self, diagnosis: Diagnosis, filing: Filing, kept: KeptBaseline | None) -> None:
+        """Take the diagnosis of a filed record, dated at its end; `kept` is the baseline."""
         time = filing.span.end
         if self._hold.until is not None and time <= self._hold.until:
             return
@@ -173,13 +173,12 @@ class _Alarms:
             conditions = {} if diagnosis.level is Level.OK else {AlarmKind.STUCK: held}
         else:
             conditions = {kind: self._hold.conditions[side] for side, kind in ALARM_OF_SIDE.items()}
-            conditions[AlarmKind.WHOLE_VALVE] = self._whole_valve(filing)
+            conditions[AlarmKind.WHOLE_VALVE] = self._whole_valve(filing, kept)
             conditions[AlarmKind.STUCK] = NO_CONDITION
         follow_alarms(self._history, self._valve, conditions, time)
 
-    def _whole_valve(self, filing: Filing) -> Condition:
+    def _whole_valve(self, filing: Filing, kept: KeptBaseline | None) -> Condition:
         """Return the condition beyond friction; it falls only if nothing can have changed."""
-        kept = self._history.baseline(self._valve.name)
         if kept is None:
             return NO_CONDITION
         valve, limits, baseline = filing.settings.valve, filing.settings.valve_limits, kept.baseline
@@ -223,7 +222,7 @@ def file_results(place: Path, filings: Iterable[Filing], first_is_baseline: bool
     history.prepare()
     ordered = sorted(filings, key=lambda one: one.span)
     before = filed_before(place, {one.tag for one in ordered})
-    in_force: dict[str, Baseline | None] = {}
+    in_force: dict[str, KeptBaseline | None] = {}
     alarms: dict[str, _Alarms] = {}
     begun: list[str] = []
     cells: dict[tuple[str, str], Mapping[str, Cell]] = {}
@@ -231,13 +230,13 @@ def file_results(place: Path, filings: Iterable[Filing], first_is_baseline: bool
     for one in ordered:
         valve = kept_valve(one.tag)
         if one.tag not in in_force:
-            kept = history.baseline(valve.name)
-            in_force[one.tag] = None if kept is None else kept.baseline
+            in_force[one.tag] = history.baseline(valve.name)
             alarms[one.tag] = _Alarms(history, valve)
         if in_force[one.tag] is None and first_is_baseline:
             in_force[one.tag] = _begin(history, valve, one)
             begun += [one.tag] if in_force[one.tag] is not None else []
-        baseline = in_force[one.tag]
+        kept = in_force[one.tag]
+        baseline = None if kept is None else kept.baseline
         diagnosis, findings = diagnose_outcome(one.outcome, baseline, one.settings)
         numbers: Mapping[str, Measured] = {}
         if isinstance(one.outcome, RefusedRecordError):
@@ -261,11 +260,11 @@ def file_results(place: Path, filings: Iterable[Filing], first_is_baseline: bool
                 **kept_of(one.outcome, numbers),
             )
         )
-        alarms[one.tag].follow(diagnosis, one)
+        alarms[one.tag].follow(diagnosis, one, kept)
     return Filed(len(ordered) - known, known, tuple(begun), cells)
 
 
-def _begin(history: HistoryFile, valve: KeptValve, one: Filing) -> Baseline | None:
+def _begin(history: HistoryFile, valve: KeptValve, one: Filing) -> KeptBaseline | None:
     """Make the first result of a valve its baseline; None where it cannot be one."""
     if isinstance(one.outcome, RefusedRecordError):
         return None
@@ -276,7 +275,7 @@ def _begin(history: HistoryFile, valve: KeptValve, one: Filing) -> Baseline | No
     record = KeptBaseline.thin(one.outcome.recording)
     kept = KeptBaseline(baseline, one.span.end, one.span.end, record, by="identify-folder")
     history.set_baseline(valve, kept)
-    return baseline
+    return kept
 
 
 @dataclass(frozen=True)

@@ -163,12 +163,14 @@ def carried(
     sliding = sliding.without_calibration
     if speed == to.speed:
         return SlidingFriction(sliding.value, sliding.half_width, speed)
-    shares = _viscous_shares(_viscous_of(parameters), sliding.value / speed)
-    step, doubt = _step(math.log(to.speed / speed), shares, numbers.get(SPEED_EXPONENT))
+    viscous, largest = _viscous_of(parameters), sliding.value / speed
+    apart = math.log(to.speed / speed)
+    shares = _viscous_shares(viscous, largest)
+    step, doubt = _step(apart, shares, numbers.get(SPEED_EXPONENT))
     if doubt > _WIDEST_STEP:
         if not far:
             return None
-        step, doubt = _farthest_step(math.log(to.speed / speed), parameters, sliding.value / speed)
+        step, doubt = _farthest_step(apart, viscous, largest)
     value = sliding.value * math.exp(step)
     share = math.hypot(sliding.half_width / sliding.value, doubt)
     return SlidingFriction(value, share * value, to.speed)
@@ -216,15 +218,12 @@ def _step(
     return mean, doubt * spread / both
 
 
-def _farthest_step(
-    apart: float, parameters: Mapping[str, Parameter], largest: float
-) -> tuple[float, float]:
+def _farthest_step(apart: float, viscous: Parameter | None, largest: float) -> tuple[float, float]:
     """Return the change of the logarithm of friction over any change of ln v, between its bounds.
 
     Nothing usual narrows them, and F_v only where it is identified: a weak one holds for the speeds
     of its record, whose lag or creep it may be.
     """
-    viscous = _viscous_of(parameters)
     if viscous is not None and viscous.without_calibration.verdict is not Verdict.IDENTIFIED:
         viscous = None
     low, high = sorted(

@@ -441,7 +441,7 @@ class FrictionMonitor:
         """The same, for a text with the diagnosis: that has the reason, if it is the same."""
         if self._refused < _REFUSED or self.refusal != self._refused_last:
             return self.refusals_problem
-        return said(Code.REFUSED_IN_A_ROW, count=self._refused)
+        return said(Code.REFUSED_REPEATEDLY, count=self._refused, reason=None)
 
     def result_as_baseline(self) -> Baseline:
         """Return the frictions of the latest result, without making them the baseline.

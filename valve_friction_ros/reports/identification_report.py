@@ -56,7 +56,7 @@ from valve_friction_ros.reports.page import (
 from valve_friction_ros.response import SIZES, ResponseSummary, Spread, StepAnswer
 from valve_friction_ros.streams import DAY, utc, utc_day
 from valve_friction_ros.usage import LimitState, Usage, ValveUsage
-from valve_friction_ros.wording import capitalised, member_words, percentage
+from valve_friction_ros.wording import capitalised, member_words, numbered, percentage
 
 _VERDICTS = (
     "Identified: half the interval is at most 5 % of the value, and nothing casts doubt on it. "
@@ -158,7 +158,7 @@ def _friction(record: IdentifiedRecord) -> Section:
 def _trend(history: ValveHistory) -> Section:
     trend, days = history.trend, len({entry.time // DAY for entry in history.entries})
     size = len(history.entries)
-    count = f"{size} identification{'s' * (size > 1)} on {days} day{'s' * (days > 1)}"
+    count = f"{numbered(size, 'identification')} on {numbered(days, 'day')}"
     told = f"{count}. No drift yet: it needs friction from four days or more, by one method."
     if trend is not None:
         told = f"{count}. Drift of the {trend.what}: {drift_text(trend)}."

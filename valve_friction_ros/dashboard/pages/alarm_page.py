@@ -40,7 +40,7 @@ from valve_friction_ros.health.alarms import TRANSITIONS
 from valve_friction_ros.history import AlarmFilter, HistoryError, KeptAlarmEvent
 from valve_friction_ros.outside_text import printable
 from valve_friction_ros.streams import DAY
-from valve_friction_ros.wording import alarm_advice
+from valve_friction_ros.wording import alarm_advice, numbered
 
 _PERIOD = 1.0
 
@@ -362,7 +362,7 @@ class _AlarmPage:
         alarms = [(one.valve, one.event.alarm.kind) for one in some]
         only, who = (AlarmAction.ACKNOWLEDGE,), self._context.visitors.name()
         answer = partial(self._context.answer_alarms, alarms)
-        title = f"Acknowledge {len(some)} alarm{'s' * (len(some) != 1)}"
+        title = f"Acknowledge {numbered(len(some), 'alarm')}"
         await self._answer.ask(title, only, who, answer)
         self._shown = ()
 
