@@ -437,6 +437,16 @@ def test_rests_of_a_long_record_are_left_out():
             assert inside == pytest.approx(200, abs=1)
 
 
+def test_stamps_at_both_ends_of_a_rest_do_not_coincide():
+    # Rests begin and end half a period before a position: between two even seconds, on an odd one.
+    stem = moves([1000.0, 20_000.0, 70_000.0], 3 * [STROKE], 90_000.0, period=2.0).position
+    seconds = np.arange(90_000.0)
+    drive = StampedSignal(seconds, np.interp(seconds, stem.time, stem.value))
+    part = moving_part(StampedRecord(drive, stem, Drive.PRESSURE))
+    assert len(part.pauses) == 2
+    np.testing.assert_allclose(np.diff(part.record.drive.time), 1.0)
+
+
 def test_of_too_much_motion_the_longest_way_is_taken():
     begins = [20.0 * index for index in range(400)]
     ways = [STROKE if 200 <= index < 300 else STROKE / 4 for index in range(400)]

@@ -194,7 +194,7 @@ def _without(
     signals = []
     for signal in (record.drive, record.position):
         passed = np.searchsorted(ends, signal.time, side="right")
-        inside = np.searchsorted(begins, signal.time, side="left") > passed
+        inside = np.searchsorted(begins, signal.time, side="right") > passed
         time = (signal.time - removed[passed])[~inside]
         signals.append(StampedSignal(time, signal.value[~inside]))
     pauses = tuple(
