@@ -488,6 +488,10 @@ class TestTime:
         assert "lags behind the pressure" in message
         assert f"{unit} read as s?" in message
 
+    def test_the_unit_of_a_date_is_known(self):
+        slow = replace(self.bench(1e3), start_time=1.8e9)
+        require_plausible_units(slow, BENCH_VALVE, DEFAULTS)
+
     @pytest.mark.parametrize("seed", range(3))
     def test_a_slow_loop_does_not_lag(self, seed):
         """Noise in the speed of slow moves is no viscous friction."""
