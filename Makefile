@@ -164,7 +164,7 @@ soak: venv  ## a month of a plant in an hour, each sample accounted for; SOAK_AR
 	@"$(VENV)/bin/python" -m benchmark.soak $(SOAK_ARGS)
 
 .PHONY: load
-load: venv-test browser  ## the dashboard before 500 valves in a real browser, 45 minutes; LOAD_ARGS="--parts bounds" for some
+load: venv-test browser  ## the dashboard before 500 valves in a real browser, 20 minutes; LOAD_ARGS="--valves 50" for less
 	@"$(VENV)/bin/python" -m benchmark.load $(LOAD_ARGS)
 
 .PHONY: hosts

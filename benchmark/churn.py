@@ -11,18 +11,14 @@
 """Streaming nodes while thousands of clients and DDS participants come and go: `make churn`."""
 
 import argparse
-import contextlib
-import itertools
 import math
 import os
 import random
-import shutil
-import signal
 import sys
 import time
 import traceback
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from multiprocessing import get_context
 from multiprocessing.process import BaseProcess
 from pathlib import Path
@@ -33,25 +29,20 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters, SetParameters
 from rclpy.qos import QoSProfile, ReliabilityPolicy
-from rosbags.rosbag2 import Reader
-from rosbags.typesys import Stores, get_typestore
 from sensor_msgs.msg import FluidPressure, JointState
 from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 
-from benchmark.harness.processes import CODES, Process, Usage, node, parameters
-from benchmark.harness.rows import Row, none, some, under
+from benchmark.harness.processes import Process, node, parameters
+from benchmark.harness.rows import Row, none, some
 from benchmark.harness.run import BENCH, Events, Ledger, Participant, by_kind, endured, run_parser
 
 RATE = 250
 """Sampling rate of each signal, Hz; low, since listening visitors cost more than the nodes."""
 
 _VALVE = "/fv_101"
-AUDITED = f"{_VALVE}/identifier"
-"""The identifier whose buffer nobody clears, so that all of its samples can be checked."""
-
 _OTHERS = ("/fv_201", "/fv_202")
-IDENTIFIERS = (AUDITED, *(f"{valve}/identifier" for valve in _OTHERS))
+IDENTIFIERS = tuple(f"{valve}/identifier" for valve in (_VALVE, *_OTHERS))
 NODES = (*IDENTIFIERS, f"{_VALVE}/simulator", f"{_VALVE}/pressure_source")
 
 STREAMS = (f"{_VALVE}/actuator_pressure", f"{_VALVE}/stem_state")
@@ -60,9 +51,7 @@ SERVICES = {"identify": 6, "set_baseline": 6, "clear": 5, "save": 2, "report": 1
 """Services of an identifier, with the relative frequency of their calls."""
 
 
-def nodes(
-    folder: Path, valve: str = _VALVE, others: Sequence[str] = _OTHERS
-) -> dict[str, list[str]]:
+def nodes(folder: Path) -> dict[str, list[str]]:
     """Return the commands that start the nodes of a plant, which writes into a folder.
 
     The valve streams like its bench. The others share a process and hear the same streams.
@@ -73,14 +62,14 @@ def nodes(
         report_folder=folder / "reports",
     )
     bench = ["--params-file", str(BENCH)]
-    place = ["-r", f"__ns:={valve}", *bench]
+    place = ["-r", f"__ns:={_VALVE}", *bench]
     heard = [
         word
-        for other in others
+        for other in _OTHERS
         for stream in ("actuator_pressure", "stem_state")
-        for word in ("-r", f"{other}/{stream}:={valve}/{stream}")
+        for word in ("-r", f"{other}/{stream}:={_VALVE}/{stream}")
     ]
-    many = [*heard, *bench, *parameters(valves=f"[{','.join(others)}]")]
+    many = [*heard, *bench, *parameters(valves=f"[{','.join(_OTHERS)}]")]
     return {
         "identifier": node("identifier", *place, *files),
         "identifiers": node("identifiers", *many, *files),
@@ -103,8 +92,6 @@ _DISCOVERY = 30.0
 _LONGEST_LISTENING = 2.0
 _MOST_ACTS = 6
 _RELIABLE = (ReliabilityPolicy.RELIABLE, ReliabilityPolicy.BEST_EFFORT)
-_AUDIT_EVERY = 25.0
-"""Time between two checks of the buffer by the auditor, s: less than half of its length."""
 
 
 class Visitor(Participant):
@@ -141,10 +128,8 @@ class Visitor(Participant):
 
 
 def _trigger(visitor: Visitor, chance: random.Random) -> None:
-    identifier = chance.choice(IDENTIFIERS)
     (name,) = chance.choices([*SERVICES], [*SERVICES.values()])
-    if not (name == "clear" and identifier == AUDITED):
-        visitor.call(Trigger, f"{identifier}/{name}", Trigger.Request())
+    visitor.call(Trigger, f"{chance.choice(IDENTIFIERS)}/{name}", Trigger.Request())
 
 
 def _parameters(visitor: Visitor, chance: random.Random) -> None:
@@ -166,7 +151,7 @@ def _parameters(visitor: Visitor, chance: random.Random) -> None:
 
 def _listen(visitor: Visitor, chance: random.Random) -> None:
     kinds = [(DiagnosticArray, "/diagnostics"), (FluidPressure, STREAMS[0])]
-    kinds += [(JointState, STREAMS[1]), (Float64, f"{AUDITED}/friction/coulomb_friction")]
+    kinds += [(JointState, STREAMS[1]), (Float64, f"{IDENTIFIERS[0]}/friction/coulomb_friction")]
     subscriptions = [
         visitor.node.create_subscription(
             kind,
@@ -205,75 +190,23 @@ def _publish_elsewhere(visitor: Visitor, chance: random.Random) -> None:
 _ACTS = {_trigger: 4, _parameters: 1, _listen: 2, _look_around: 1, _publish_elsewhere: 1}
 
 
-def visit(ledger: Ledger, number: int, chance: random.Random) -> None:
-    """Come, act several times, and leave; one in four leaves without saying goodbye."""
-    visitor = Visitor(ledger, f"visitor_{number}")
-    for _ in range(chance.randint(1, _MOST_ACTS)):
-        (act,) = chance.choices([*_ACTS], [*_ACTS.values()])
-        act(visitor, chance)
-    if chance.random() < 0.25:
-        os._exit(0)
-    visitor.close()
+def visit(ledger: Ledger, number: int, seed: int) -> None:
+    """Come, act several times, and leave; one in four leaves without saying goodbye.
 
-
-def _stamps(bag: Path) -> dict[str, np.ndarray]:
-    types = get_typestore(Stores.ROS2_JAZZY)
-    found: dict[str, list[int]] = {topic: [] for topic in STREAMS}
-    with Reader(bag) as reader:
-        for connection, _, raw in reader.messages():
-            stamp = types.deserialize_cdr(raw, connection.msgtype).header.stamp
-            found[connection.topic].append(stamp.sec * 1_000_000_000 + stamp.nanosec)
-    return {topic: np.array(stamps) for topic, stamps in found.items()}
-
-
-def missing_samples(stamps: np.ndarray) -> int:
-    """Return the number of samples missing between the first and last stamp, ns, of a signal."""
-    return 0 if stamps.size == 0 else round(np.ptp(stamps) * RATE / 1e9) + 1 - stamps.size
-
-
-def audit(ledger: Ledger, seconds: float) -> None:
-    """Save the buffer of the audited identifier repeatedly, and count missing samples.
-
-    Also log the longest silence on `/diagnostics`.
+    An exception that ends the visit is noted.
     """
-    published: list[float] = []
-
-    def note(message: DiagnosticArray) -> None:
-        if any(status.name.startswith(AUDITED) for status in message.status):
-            stamp = message.header.stamp
-            published.append(stamp.sec + stamp.nanosec / 1e9)
-
-    until = time.monotonic() + seconds
-    with Visitor(ledger, "auditor") as visitor:
-        visitor.node.create_subscription(DiagnosticArray, "/diagnostics", note, 1000)
-        while time.monotonic() < until:
-            visitor.spin(_AUDIT_EVERY)
-            published.append(time.time())  # includes a silence that still lasts
-            answer = visitor.call(Trigger, f"{AUDITED}/save", Trigger.Request())
-            if answer is None or not answer.success:
-                ledger.add("unsaved", message=getattr(answer, "message", "no answer"))
-                continue
-            bag = Path(answer.message)
-            for topic, stamps in _stamps(bag).items():
-                ledger.add(
-                    "samples",
-                    topic=topic,
-                    first=int(stamps.min(initial=2**62)),
-                    last=int(stamps.max(initial=0)),
-                    count=stamps.size,
-                    missing=missing_samples(stamps),
-                )
-            shutil.rmtree(bag)
-            if len(published) > 1:
-                ledger.add("diagnostics", longest=float(np.diff(published).max()))
-                del published[:-1]
-
-
-_END_LIMIT = 3.0
-"""Longest time for a node to end after a signal, s."""
-_SILENCE_LIMIT = 5.0
-_LOOKED_AT, _LATE = 0.95, 60.0
-"""Share of the stream to examine, and time excluded at its ends, s."""
+    chance = random.Random(seed)
+    try:
+        visitor = Visitor(ledger, f"visitor_{number}")
+        for _ in range(chance.randint(1, _MOST_ACTS)):
+            (act,) = chance.choices([*_ACTS], [*_ACTS.values()])
+            act(visitor, chance)
+        if chance.random() < 0.25:
+            os._exit(0)
+        visitor.close()
+    except BaseException:
+        ledger.add("broken", number=number, trace=traceback.format_exc())
+        raise
 
 
 def hung_services(events: Events, until: float = math.inf) -> list[str]:
@@ -312,33 +245,6 @@ def _call_rows(calls: Events) -> Iterator[Row]:
     yield none("never answered", len(calls) - len(answered))
 
 
-def _sample_rows(bags: Events, unsaved: int, seconds: float) -> Iterator[Row]:
-    holes, covered = 0, 0.0
-    for topic in sorted({one["topic"] for one in bags}):
-        mine = [one for one in bags if one["topic"] == topic and one["count"]]
-        covered += mine[0]["last"] - mine[0]["first"] if mine else 0
-        for earlier, later in itertools.pairwise(mine):
-            covered += later["last"] - max(earlier["last"], later["first"])
-            holes += later["first"] > earlier["last"]
-    least = 2 * _LOOKED_AT * (seconds - _LATE)
-    goal, met = f"at least {least:.0f} s", covered / 1e9 >= least
-    yield Row("stream looked at, both signals", covered / 1e9, "s", goal=goal, met=met)
-    yield none("samples lost", sum(one["missing"] for one in bags))
-    yield none("times at which the look came too late", holes + unsaved)
-
-
-def _ending_rows(endings: Events) -> Iterator[Row]:
-    yield some("nodes ended by SIGINT or SIGTERM", len(endings))
-    times = [one["seconds"] for one in endings if one["seconds"] is not None]
-    if times:
-        yield Row("longest time to their end", max(times), "s")
-    bad = sum(one["seconds"] is None or one["seconds"] > _END_LIMIT for one in endings)
-    yield none(f"ended after more than {_END_LIMIT:g} s", bad)
-    early = sum(one["code"] in CODES[1:] for one in endings)
-    yield Row("ended by the signal itself, before Python ran", early)
-    yield none("ended with another code", sum(one["code"] not in CODES for one in endings))
-
-
 def rows(events: Events) -> Iterator[Row]:
     """Count the events, and compare them with the goals."""
     of = by_kind(events)
@@ -346,26 +252,12 @@ def rows(events: Events) -> Iterator[Row]:
     visits = sum(ends.values())
     yield some("participants that came and went", visits)
     yield Row("of them killed", ends["killed"])
-    odd = len(of["broken"]) + visits - ends["gone"] - ends["killed"]
-    yield none("of these and their helpers failed", odd)
+    yield none("of these failed", visits - ends["gone"] - ends["killed"])
     yield from _call_rows(of["call"])
     yield Row("clients that were never answered, twice", len(of["unanswered twice"]))
     yield none("services not found in 30 s", len(of["undiscovered"]))
-    seconds = max((one["seconds"] for one in of["run"]), default=0.0)
-    yield from _sample_rows(of["samples"], len(of["unsaved"]), seconds)
-    silence = max((one["longest"] for one in of["diagnostics"]), default=np.inf)
-    yield under("longest silence on /diagnostics", silence, "s", _SILENCE_LIMIT)
-    yield from _ending_rows(of["ending"])
-    for one in of["node"]:
-        name = one["name"]
-        yield Row(f"{name}: processor", one["cores"], "cores")
-        yield Row(f"{name}: memory", one["memory"], "MB", one["early_memory"], "after a minute")
-        yield Row(f"{name}: threads", one["threads"], "", one["early_threads"], "after a minute")
     yield none("nodes that ended themselves, frozen", len(of["ended itself"]))
     yield none("nodes that died or hung", len(of["died"]))
-    for one in of["shared memory"]:
-        yield Row("shared memory: files, most", one["files"])
-        yield Row("shared memory in use, most", one["megabytes"], "MB")
 
 
 _PAUSE = 1.2
@@ -376,39 +268,6 @@ _LONGEST_LIFE = 5.0
 """Longest time until they are killed, s."""
 _VISIT_LIMIT = 120.0
 """Time, s, after which a visitor is considered hung."""
-_ENDING_PAUSE = 10.0
-_FIRST_SECONDS = 3.0
-_LONGEST_RUN = 12.0
-
-
-def _logged(work: Callable[[], None], ledger: Ledger, name: str) -> None:
-    """Do some work in a child process, and note an exception that ends it."""
-    try:
-        work()
-    except BaseException as error:
-        ledger.add("broken", name=name, error=repr(error), trace=traceback.format_exc())
-        raise
-
-
-def _endings(ledger: Ledger, folder: Path, seed: int, seconds: float) -> None:
-    """Start nodes in turn, and end each at a random time, often in its first seconds."""
-    chance, until, number = random.Random(seed), time.monotonic() + seconds, 0
-    kinds = nodes(folder, "/fv_301", ("/fv_401", "/fv_402"))
-    while time.monotonic() < until:
-        number += 1
-        name = chance.choice(sorted(kinds))
-        log = folder / f"ending_{number}_{name}.log"
-        process = Process(kinds[name], log)
-        within = _FIRST_SECONDS if chance.random() < 0.6 else _LONGEST_RUN
-        time.sleep(alive := chance.uniform(0.0, within))
-        request = chance.choice((signal.SIGINT, signal.SIGTERM))
-        took, code = process.end(request), process.exit_code()
-        known = {"node": name, "request": request.name, "alive": alive, "seconds": took}
-        words = "" if code in CODES else process.said()[-2000:]
-        ledger.add("ending", **known, code=code, words=words)
-        if code in CODES:
-            log.unlink()
-        time.sleep(chance.uniform(0.0, _ENDING_PAUSE))
 
 
 class Crowd:
@@ -422,21 +281,7 @@ class Crowd:
         self._chance = random.Random(seed)
         self._visitors: dict[BaseProcess, tuple[float, bool]] = {}
         """Present visitors: end of the visit, and whether they are killed then."""
-        self._others: list[BaseProcess] = []
         self._count, self._next = 0, 0.0
-
-    def _forked(self, work: Callable[[], None], name: str) -> BaseProcess:
-        child = get_context("fork").Process(target=_logged, args=(work, self._ledger, name))
-        child.start()
-        return child
-
-    def begin(self, folder: Path, seconds: float) -> None:
-        """Start the auditor, and the process that ends nodes."""
-        seed = self._chance.randrange(2**31)
-        self._others = [
-            self._forked(lambda: audit(self._ledger, seconds), "audit"),
-            self._forked(lambda: _endings(self._ledger, folder, seed, seconds), "endings"),
-        ]
 
     def turn(self) -> None:
         """Kill visitors that are due, note those that have left, and start others."""
@@ -461,37 +306,27 @@ class Crowd:
 
     def _let_one_come(self, now: float) -> None:
         self._count += 1
-        number, seed = self._count, self._chance.randrange(2**63)
         is_killed = self._chance.random() < _KILLED
         life = self._chance.uniform(0.0, _LONGEST_LIFE) if is_killed else _VISIT_LIMIT
-        child = self._forked(lambda: visit(self._ledger, number, random.Random(seed)), "visitor")
+        told = self._ledger, self._count, self._chance.randrange(2**63)
+        child = get_context("fork").Process(target=visit, args=told)
+        child.start()
         self._visitors[child] = now + life, is_killed
 
     def end(self, patience: float = _VISIT_LIMIT) -> None:
         """Wait until all processes are done; kill those that remain."""
         until = time.monotonic() + patience
-        for child in (*self._visitors, *self._others):
+        for child in self._visitors:
             child.join(max(0.0, until - time.monotonic()))
             if child.exitcode is None:
                 self._kill(child, "hung")
-        self._visitors, self._others = {}, []
+        self._visitors = {}
 
 
 _TURN = 0.05
 _LOOK_EVERY = 10.0
-_SETTLED = 60.0
 _FROZEN = 1
 """Exit code of a node that has ended itself because it was frozen."""
-_SHARED_MEMORY = Path("/dev/shm")  # noqa: S108 - where Fast DDS has its files
-
-
-def _shared_memory() -> tuple[int, float]:
-    """Return number and total size, MB, of the files of Fast DDS."""
-    sizes = []
-    for file in _SHARED_MEMORY.glob("*fastrtps*"):
-        with contextlib.suppress(FileNotFoundError):
-            sizes.append(file.stat().st_blocks * 512)
-    return len(sizes), sum(sizes) / 1e6
 
 
 class _Plant:
@@ -504,36 +339,15 @@ class _Plant:
 
     def watch(self, seconds: float, crowd: Crowd) -> None:
         """Let the crowd come and go until the time is up or a node has died."""
-        self._ledger.add("run", seconds=seconds)
-        begin = next_look = time.monotonic()
-        first = dict(self.processes)
-        early: dict[str, Usage] = {}
-        most = (0, 0.0)
-        while (elapsed := time.monotonic() - begin) < seconds:
+        end = time.monotonic() + seconds
+        next_look = 0.0
+        while time.monotonic() < end:
             crowd.turn()
             if time.monotonic() > next_look:
-                next_look += _LOOK_EVERY
-                most = max(most, _shared_memory(), key=lambda one: one[1])
+                next_look = time.monotonic() + _LOOK_EVERY
                 if self._have_died():
                     break
-                if not early and elapsed > min(_SETTLED, seconds / 2):
-                    early = {name: process.usage() for name, process in self.processes.items()}
             time.sleep(_TURN)
-        for name, process in self.processes.items():
-            if process is first[name] and process.exit_code() is None and name in early:
-                self._note_usage(name, early[name], process.usage())
-        self._ledger.add("shared memory", files=most[0], megabytes=most[1])
-
-    def _note_usage(self, name: str, early: Usage, now: Usage) -> None:
-        self._ledger.add(
-            "node",
-            name=name,
-            cores=now.cores_since(early),
-            early_memory=early.memory,
-            memory=now.memory,
-            early_threads=early.threads,
-            threads=now.threads,
-        )
 
     def _have_died(self) -> bool:
         """Note dead and hung nodes; hung nodes write their stacks to their logs.
@@ -554,13 +368,11 @@ class _Plant:
                 self._ledger.add("died", name=name, code=code)
         return any(code not in (None, _FROZEN) for code in codes.values())
 
-    def end(self, seconds: float) -> None:
-        """End the nodes after some seconds, by SIGINT and SIGTERM in turn."""
-        for number, (name, process) in enumerate(self.processes.items()):
+    def end(self) -> None:
+        """End the nodes that still run."""
+        for process in self.processes.values():
             if process.exit_code() is None:
-                took = process.end((signal.SIGINT, signal.SIGTERM)[number % 2])
-                code = process.exit_code()
-                self._ledger.add("ending", node=name, alive=seconds, seconds=took, code=code)
+                process.end()
 
 
 def _live(options: argparse.Namespace, seconds: float, ledger: Ledger) -> Iterator[Row]:
@@ -570,12 +382,11 @@ def _live(options: argparse.Namespace, seconds: float, ledger: Ledger) -> Iterat
     try:
         for name in nodes(options.folder):
             plant.start(name)
-        crowd.begin(options.folder, seconds)
         plant.watch(seconds, crowd)
         crowd.end()
     finally:
         crowd.end(0.0)
-        plant.end(seconds)
+        plant.end()
     return rows(ledger.events())
 
 

@@ -12,7 +12,6 @@
 
 import argparse
 import contextlib
-import itertools
 import math
 import os
 import random
@@ -25,13 +24,12 @@ from pathlib import Path
 from typing import NamedTuple
 from urllib.parse import quote
 
-import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from playwright.sync_api import Browser, BrowserContext, Error, Page, sync_playwright
 from rclpy.serialization import serialize_message
 
 from benchmark.harness.processes import Process, free_port, module, parameters, running
-from benchmark.harness.rows import Row, at_most, judged, opened_console, rows_table, under
+from benchmark.harness.rows import Row, at_most, judged, opened_console, rows_table
 from benchmark.harness.run import Participant, own_folder, quiet_domain
 from benchmark.load_plant import identifier_of, ratio_of, tag_of
 from valve_friction_ros.health import (
@@ -169,9 +167,9 @@ class Stage:
         self.dashboard.wait_for("ready: open")
 
     @contextlib.contextmanager
-    def shown(self, rate: float, *more: str) -> Iterator[None]:
+    def shown(self, *more: str) -> Iterator[None]:
         """Provide a plant shown by the dashboard."""
-        given = ("--valves", str(self.valves), "--rate", str(rate), *more)
+        given = ("--valves", str(self.valves), *more)
         with self._start("benchmark.load_plant", str(self._template), *given) as plant:
             plant.wait_for("publishing")
             self.show()
@@ -271,111 +269,6 @@ def wait_on_page(page: Page, expression: str) -> None:
                 return
         page.wait_for_timeout(20)
     raise RuntimeError(f"not within {_PATIENCE:g} s: {expression}")
-
-
-_LOOK_EVERY = 10.0
-_SETTLED = 0.3
-"""Share of the run after which all caches are filled."""
-_GROWTH = 10.0
-"""Largest growth of steady memory after that, MB. Chosen: 5 % of the bound."""
-_TABS = 4
-_SEARCHES = ("q=12-fv", "show=error,warn", "ne=F&sort=-ratio", "view=tiles")
-
-
-def _heap(page: Page) -> float:
-    """Return the memory of a page's scripts in the browser, MB."""
-    session = page.context.new_cdp_session(page)
-    session.send("HeapProfiler.collectGarbage")
-    session.send("Performance.enable")
-    metrics = {
-        one["name"]: one["value"] for one in session.send("Performance.getMetrics")["metrics"]
-    }
-    session.detach()
-    return float(metrics["JSHeapUsedSize"]) / 1e6
-
-
-class _Visitor:
-    """Opens, uses and closes tabs."""
-
-    def __init__(self, browser: Browser, stage: Stage, seed: int) -> None:
-        self._browser, self._stage = browser, stage
-        self._chance = random.Random(seed)
-        self._tabs: list[Page] = []
-        self.pages = 0
-
-    def _draw(self) -> Visit:
-        is_live = self._chance.random() < 0.3
-        valve = LIVE if is_live else identifier_of(self._chance.randrange(self._stage.valves))
-        drawn = "document.querySelector('.vf-row, .vf-tile')"
-        searches = tuple(Visit("search", f"/?{query}", drawn) for query in _SEARCHES)
-        return self._chance.choice(pages_of(self._stage.valves, valve)[1:] + searches)
-
-    def turn(self) -> None:
-        """Open a page in a new or an existing tab, reload a tab, or close one."""
-        self.pages += 1
-        chance = self._chance.random()
-        if not self._tabs or (chance < 0.4 and len(self._tabs) < _TABS):
-            context = self._browser.new_context()
-            self._tabs.append(visit(context, self._stage.address, self._draw())[1])
-        elif chance < 0.75:
-            tab = self._chance.choice(self._tabs)
-            tab.goto(self._stage.address + self._draw().path, wait_until="commit")
-            # An evaluation on a page that is being left may never return.
-            tab.wait_for_function("window.did_handshake", polling=50, timeout=1e3 * _PATIENCE)
-        elif chance < 0.85:
-            self._chance.choice(self._tabs).reload(wait_until="commit")
-        else:
-            tab = self._tabs.pop(self._chance.randrange(len(self._tabs)))
-            tab.context.close()
-
-    def close(self) -> None:
-        for tab in self._tabs:
-            tab.context.close()
-        self._tabs.clear()
-
-
-def _looks(
-    browser: Browser, stage: Stage, seconds: float, seed: int, file: Path
-) -> Iterator[tuple[float, ...]]:
-    """Yield time, memory, threads and files of the dashboard, pages opened so far, and the heap."""
-    visitor = _Visitor(browser, stage, seed)
-    with browser.new_context() as context, file.open("w", encoding="utf-8") as written:
-        wall = visit(context, stage.address, pages_of(stage.valves, LIVE)[0])[1]
-        begin = time.monotonic()
-        for due in itertools.count(1):
-            while time.monotonic() < begin + due * _LOOK_EVERY:
-                visitor.turn()
-            now = stage.dashboard.usage()
-            passed = now.time - begin
-            look = (passed, now.memory, now.threads, now.files, visitor.pages, _heap(wall))
-            print(*look, sep=",", file=written, flush=True)
-            stage.say(f"{passed:.0f} s: {visitor.pages} pages, {now.memory:.1f} MB")
-            yield look
-            if passed > seconds:
-                break
-        visitor.close()
-
-
-def _growth(times: np.ndarray, values: np.ndarray) -> float:
-    """Return the growth of a straight line fitted to the values."""
-    return float(np.polyfit(times, values, 1)[0] * (times[-1] - times[0]))
-
-
-def afternoon_rows(stage: Stage, browser: Browser, minutes: float, seed: int) -> Iterator[Row]:
-    """Use the dashboard for some minutes, and compare its early and late resources."""
-    file = stage.folder / "afternoon.csv"
-    looks = np.array(list(_looks(browser, stage, 60 * minutes, seed, file)))
-    late = looks[looks[:, 0] > _SETTLED * looks[-1, 0]]
-    times = late[:, 0]
-    yield Row("pages opened, used and closed", looks[-1, 4], "")
-    yield Row("memory at the end", late[-1, 1], "MB", late[0, 1], "once settled")
-    grown = _growth(times, late[:, 1])
-    yield under("growth of the memory since then", grown, "MB", _GROWTH)
-    for name, column in (("threads", 2), ("open files and sockets", 3)):
-        yield Row(name, late[:, column].max(), "", late[0, column], "once settled")
-        yield under(f"growth of the {name}", _growth(times, late[:, column]), "", 5)
-    yield Row("the wall screen's own memory", late[-1, 5], "MB", late[0, 5], "once settled")
-    yield under("growth of that", _growth(times, late[:, 5]), "MB", 5)
 
 
 _READY = 1.0
@@ -491,20 +384,17 @@ def bound_rows(
     yield from _healed(stage, launch, repeats)
 
 
-_PARTS = ("bounds", "afternoon", "picture")
+_PARTS = ("bounds", "picture")
 _SETTLE = 2500
 """Time for a page to finish drawing, ms."""
 
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="load", description=__doc__)
-    parser.add_argument("--parts", nargs="+", choices=_PARTS, default=_PARTS[:2])
+    parser.add_argument("--parts", nargs="+", choices=_PARTS, default=_PARTS[:1])
     parser.add_argument("--valves", type=int, default=500)
     parser.add_argument("--seconds", type=float, default=60.0, help="of each usage (%(default)g)")
     parser.add_argument("--repeats", type=int, default=5, help="of each time (%(default)s)")
-    parser.add_argument("--minutes", type=float, default=25.0, help="of use (%(default)g)")
-    parser.add_argument("--rate", type=float, default=5.0, help="Hz of that use (%(default)g)")
-    parser.add_argument("--seed", type=int, default=1, help="of that use (%(default)s)")
     parser.add_argument("--folder", type=Path, help="of history and logs; default: a new one")
     return parser
 
@@ -523,14 +413,10 @@ def _measured(options: argparse.Namespace, stage: Stage) -> Iterator[tuple[str, 
     with running(stage.processes), launched() as launch:
         stage.prepare()
         if "bounds" in options.parts:
-            with stage.shown(1.0):
+            with stage.shown():
                 yield "bounds", list(bound_rows(stage, launch, options.seconds, options.repeats))
-        if "afternoon" in options.parts:
-            with stage.shown(options.rate):
-                use = afternoon_rows(stage, launch(), options.minutes, options.seed)
-                yield "afternoon", list(use)
         if "picture" in options.parts:
-            with stage.shown(1.0, "--still"):
+            with stage.shown("--still"):
                 _take_manual_picture(stage, launch(), stage.folder / "dashboard.png")
 
 

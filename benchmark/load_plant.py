@@ -114,26 +114,20 @@ def _diagnostics(status: DiagnosticStatus) -> bytes:
     return serialize_message(DiagnosticArray(status=[status]))
 
 
-def _due(count: int, rate: float) -> Iterator[tuple[int, int]]:
-    """Yield beat and index of each valve when due, evenly spread over each beat."""
+def _due(count: int) -> Iterator[tuple[int, int]]:
+    """Yield beat and index of each valve when due, evenly spread over each beat of a second."""
     begin, beat = time.monotonic(), 0
     while True:
         for index in range(count):
-            due = begin + (beat + index / count) / rate
+            due = begin + beat + index / count
             if (wait := due - time.monotonic()) > 0.005:
                 time.sleep(wait)
             yield beat, index
         beat += 1
 
 
-def _publish(
-    node: Node,
-    template: DiagnosticStatus,
-    count: int,
-    rate: float,
-    every: int,
-) -> Iterator[None]:
-    """Publish; if `every` is the number of valves, identify the next valve at each beat."""
+def _publish(node: Node, template: DiagnosticStatus, count: int, is_still: bool) -> Iterator[None]:
+    """Publish; unless the plant is still, identify the next valve at each beat."""
     diagnostics = node.create_publisher(DiagnosticArray, "/diagnostics", 1000)
     estimates = [
         node.create_publisher(DiagnosticStatus, f"{identifier_of(index)}/estimate", LATCHED)
@@ -144,8 +138,8 @@ def _publish(
     latched = [[serialize_message(status) for status in beats] for beats in known]
     del known
     print("publishing", flush=True)  # the parent process waits for this
-    for beat, index in _due(count, rate):
-        if index == beat % every and beat >= _BEATS and every == count:
+    for beat, index in _due(count):
+        if not is_still and index == beat % count and beat >= _BEATS:
             anew = status_of(template, index, beat)
             arrays[index] = [_diagnostics(anew)] * _BEATS
             latched[index] = [serialize_message(anew)] * _BEATS
@@ -159,7 +153,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("template", type=Path, help="a serialised DiagnosticStatus")
     parser.add_argument("--valves", type=int, default=500)
-    parser.add_argument("--rate", type=float, default=1.0, help="Hz")
     parser.add_argument("--still", action="store_true", help="no valve is identified anew")
     options = parser.parse_args(arguments)
     stopped: list[int] = []
@@ -167,8 +160,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     node = rclpy.create_node("plant", enable_rosout=False, start_parameter_services=False)
     template = deserialize_message(options.template.read_bytes(), DiagnosticStatus)
-    every = sys.maxsize if options.still else options.valves
-    for _ in _publish(node, template, options.valves, options.rate, every):
+    for _ in _publish(node, template, options.valves, options.still):
         if stopped:
             break
     node.destroy_node()

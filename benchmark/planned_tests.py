@@ -20,6 +20,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+import pandas as pd
 
 from benchmark.reality.package import identify
 from benchmark.reality.plants import GRID, Body, Friction, Law, Plant, Trend, move, open_loop
@@ -142,53 +143,37 @@ def trials(count: int, first_seed: int = _HELD_BACK) -> Iterator[Trial]:
         yield Trial(law, wrong, predicted, reported, square, errors, refusal, reach)
 
 
-def _quantiles(values: Sequence[float]) -> str:
-    if not values:
-        return "–"
-    low, middle, high = np.quantile(values, [0.1, 0.5, 0.9])
-    return f"{middle:6.2f}  ({low:.2f} to {high:.2f}; {len(values)})"
-
-
-def _ratios(found: Sequence[Trial], name: str, over: str, under: str) -> list[float]:
-    """Return the ratios where both shares are known and the denominator is below 1."""
-    pairs = [(getattr(one, over).get(name), getattr(one, under).get(name)) for one in found]
-    return [
-        above / below
-        for above, below in pairs
-        if above is not None and below is not None and 0.0 < below < 1.0
-    ]
-
-
 def report(found: Sequence[Trial]) -> str:
-    """Return the table of medians, with 10 and 90 % quantiles and counts."""
-    lines = []
-    for law in (*_LAWS, "all"):
-        some = [one for one in found if law in (one.law, "all")]
-        refused = sum(bool(one.refusal) for one in some)
-        lines.append(f"{law}: {len(some)} valves, {refused} refused")
-        for name in NUMBERS:
-            inside = [
-                one.errors[name] <= one.reported[name] for one in some if name in one.reported
-            ]
-            ratios = "  ".join(
-                f"{over}/{under} {_quantiles(_ratios(some, name, over, under))}"
-                for over, under in _COMPARED
-            )
-            lines.append(f"  {name:<17} {ratios}  in the interval {sum(inside)} of {len(inside)}")
-    for wrong in _WRONG:
-        some = [one for one in found if one.wrong == wrong]
-        widths = [
-            one.reported["coulomb_friction"] for one in some if "coulomb_friction" in one.reported
-        ]
-        lines.append(
-            f"assumed {wrong:g} times the friction: F_c to ± {_quantiles(widths)} of itself"
-        )
-    reach = [one.reach for one in found if one.reach != (0.0, 0.0)]
-    lines.append(
-        f"positions from {100 * min(low for low, _ in reach):.1f} to "
-        f"{100 * max(high for _, high in reach):.1f} % of the travel"
+    """Return the table of medians, with 10 and 90 % quantiles, by law and number.
+
+    A ratio counts where its denominator is below 1. `in interval` is the share of true values.
+    """
+    shares = ("predicted", "reported", "square", "errors")
+    frame = pd.DataFrame(
+        {"law": one.law, "assumed": one.wrong, "number": name}
+        | {share: getattr(one, share).get(name, np.nan) for share in shares}
+        for one in found
+        for name in NUMBERS
     )
-    return "\n".join(lines)
+    for over, under in _COMPARED:
+        frame[f"{over}/{under}"] = frame[over] / frame[under].where(
+            frame[under].between(0.0, 1.0, "neither")
+        )
+    frame["in interval"] = (frame["errors"] <= frame["reported"]).where(frame["reported"].notna())
+    groups = pd.concat([frame, frame.assign(law="all")]).groupby(["law", "number"])
+    ratios = [f"{over}/{under}" for over, under in _COMPARED]
+    table = groups[ratios].quantile([0.1, 0.5, 0.9]).unstack()
+    table["in interval"] = groups["in interval"].mean()
+    widths = frame[frame["number"] == "coulomb_friction"].groupby("assumed")["reported"]
+    refused = sum(bool(one.refusal) for one in found)
+    reach = np.array([one.reach for one in found if one.reach != (0.0, 0.0)])
+    return (
+        f"{table.round(2).to_string()}\n\n"
+        "F_c known to, share of itself, by assumed over true friction:\n"
+        f"{widths.describe([0.1, 0.5, 0.9]).round(3).to_string()}\n\n"
+        f"{len(found)} valves, {refused} refused\n"
+        f"positions from {100 * reach.min():.1f} to {100 * reach.max():.1f} % of the travel"
+    )
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

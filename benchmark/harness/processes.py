@@ -67,13 +67,11 @@ def resident_megabytes(process: int) -> float:
 
 
 class Usage(NamedTuple):
-    """Resource use of a process at a time, s: processor time, s, memory, MB, threads and files."""
+    """Resource use of a process at a time, s: processor time, s, and memory, MB."""
 
     time: float
     processor: float
     memory: float
-    threads: int
-    files: int
 
     def cores_since(self, earlier: "Usage") -> float:
         """Return the mean number of cores used since then."""
@@ -183,10 +181,8 @@ class Process(contextlib.AbstractContextManager["Process"]):
 
     def usage(self) -> Usage:
         """Return the resource use so far."""
-        process = Path(f"/proc/{self.pid}")
-        threads, files = (len(list((process / name).iterdir())) for name in ("task", "fd"))
         processor, memory = processor_seconds(self.pid), resident_megabytes(self.pid)
-        return Usage(time.monotonic(), processor, memory, threads, files)
+        return Usage(time.monotonic(), processor, memory)
 
     def proportional(self) -> float:
         """Return the proportional set size, MB: shared memory is divided among its processes."""

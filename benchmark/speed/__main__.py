@@ -26,13 +26,12 @@ from benchmark.harness.rows import (
 )
 from benchmark.harness.run import quiet_domain
 from benchmark.speed.live import PROFILE, many_valves, streams
-from benchmark.speed.many_recordings import cluster, fleet
+from benchmark.speed.many_recordings import fleet
 from benchmark.speed.offline import Settings, identification, simulation, sweep
 
 _DEMO = Path(__file__).resolve().parents[2] / "valve_friction_ros" / "commands" / "demo"
 _PARTS: dict[str, Callable[[Settings], Iterator[Row]]] = {
-    one.__name__: one
-    for one in (cluster, fleet, identification, many_valves, simulation, streams, sweep)
+    one.__name__: one for one in (fleet, identification, many_valves, simulation, streams, sweep)
 }
 """Parts by name, which yield each row as soon as it is measured; the first line of the docstring is
 the title."""

@@ -8,14 +8,13 @@
 # language governing permissions and limitations under the License.
 
 
-"""Recordings identified by processes, and by the workers of a cluster."""
+"""Recordings identified by the processes of one machine."""
 
 import os
 import statistics
 import tempfile
 import time
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
@@ -31,7 +30,6 @@ from valve_friction_ros.fleet import (
     in_processes,
     usable_cores,
 )
-from valve_friction_ros.fleet.workers import Cluster, cluster_at, in_cluster
 from valve_friction_ros.identification import DEFAULT_METHOD, IdentificationSettings
 from valve_friction_ros.model import BENCH_VALVE, HIGH_FRICTION, SensorNoise
 from valve_friction_ros.records.recordings import ReadingOptions
@@ -132,54 +130,3 @@ def fleet(settings: Settings) -> Iterator[Row]:
     item = f"processor seconds a recording, {cores} processes"
     goal, met = f"at most 1/{_SHARE} of it", _SHARE * every.processor <= one.processor
     yield Row(item, every.processor, "s", one.processor, peer, goal, met)
-
-
-_WORKERS = (1, 2)
-_OVERHEAD, _GAIN = 1.15, 1.8
-
-
-@contextmanager
-def _cluster(workers: int) -> Iterator[Cluster]:
-    """Start a scheduler and single-threaded workers, and connect to the scheduler."""
-    from distributed import LocalCluster  # noqa: PLC0415 - an extra
-
-    with (
-        LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=None) as started,
-        cluster_at(started.scheduler_address) as cluster,
-    ):
-        cluster.compare()
-        yield cluster
-
-
-def cluster(settings: Settings) -> Iterator[Row]:
-    """Identify many recordings on the workers of a Dask cluster, beside processes of one machine.
-
-    Recordings and clock are the same as in `fleet`. This part needs the extra `cluster`, and as
-    many free cores as workers.
-    """
-    pool: dict[int, list[Cost]] = {count: [] for count in _WORKERS}
-    workers: dict[int, list[Cost]] = {count: [] for count in _WORKERS}
-    with tempfile.TemporaryDirectory() as folder:
-        paths = write_recordings(Path(folder))
-        for repeat in range(settings.repeats):
-            for count in _WORKERS:
-                settings.say(f"{count} processes and workers, {repeat + 1} of {settings.repeats}")
-                jobs = recordings(paths, count)
-                answers = in_processes(timed, jobs, count, lambda: False)
-                pool[count].append(cost_of(answers, count))
-                with _cluster(count) as cluster:
-                    found = in_cluster(cluster, timed, jobs, lambda: False)
-                    workers[count].append(cost_of(found, count))
-    walls = {
-        (name, count): statistics.median(one.wall for one in costs[count])
-        for name, costs in (("pool", pool), ("workers", workers))
-        for count in _WORKERS
-    }
-    for count in _WORKERS:
-        ours, peer = walls["workers", count], walls["pool", count]
-        item, goal = f"seconds a recording, {count} workers", f"at most {_OVERHEAD:g} times it"
-        name = f"{count} processes"
-        yield Row(item, ours, "s", peer, name, goal, ours <= _OVERHEAD * peer)
-    one, two = walls["workers", 1], walls["workers", 2]
-    goal = f"at least {_GAIN:g} times faster"
-    yield Row("two workers", two, "s", one, "one worker", goal, one >= _GAIN * two)

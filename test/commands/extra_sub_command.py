@@ -18,8 +18,6 @@ import signal
 import sys
 import time
 
-import pandas as pd
-
 from valve_friction_ros.commands import main
 from valve_friction_ros.commands.arguments import declared
 from valve_friction_ros.identification import RefusalError
@@ -55,6 +53,8 @@ def interrupt(ending):
         except KeyboardInterrupt as interrupt:
             raise ImportError("numpy cannot be imported") from interrupt
     if ending == "in a parser":
+        import pandas as pd
+
         pd.read_csv(InterruptingFile())
     if ending == "ignored":
         Interrupting()

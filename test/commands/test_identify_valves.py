@@ -46,6 +46,12 @@ from valve_friction_ros.model import (
 SETTINGS = IdentificationSettings(assumed_mass=1.6)  # of the valve file
 
 
+@pytest.fixture
+def call(command, bench_yaml):
+    """Function of arguments: exit code, stdout and stderr of `identify` on the bench valve."""
+    return partial(command, "identify", "--valve", bench_yaml)
+
+
 @pytest.fixture(scope="module")
 def noisy(quick_record):
     return SensorNoise(position=10e-6, pressure=100.0, seed=1).applied_to(quick_record)
@@ -56,15 +62,15 @@ def path(write_csv, columns_of, noisy):
     return write_csv(columns_of(noisy))
 
 
-def test_the_result_of_the_library(printed, path, noisy, bench_options):
-    answer = printed(path, *bench_options)
+def test_the_result_of_the_library(printed, path, noisy):
+    answer = printed(path)
     expected = identify_plant(noisy, BENCH_VALVE, SETTINGS)
     assert set(answer) == KEYS | {"diagnosis", "findings"}
     assert answer["method"] == expected.method == "plant"
     assert [*answer["parameters"]] == [*UNITS, "sliding_friction"]
     assert answer["derivative_window"] == 0
-    assert answer == printed(path, *bench_options, "--method", "plant")
-    assert answer == printed(path, *bench_options, "--method", "best")
+    assert answer == printed(path, "--method", "plant")
+    assert answer == printed(path, "--method", "best")
 
 
 @pytest.mark.parametrize("method", ["published", "signature"])
@@ -78,9 +84,9 @@ def test_other_methods_refuse_a_gap(refusal, write_csv, columns_of, noisy, bench
     )
 
 
-def test_calibration_reaches_settings_intervals_and_budget(printed, path, bench_options):
+def test_calibration_reaches_settings_intervals_and_budget(printed, path):
     scales = ("--area-uncertainty=0.01", "--drive-scale-uncertainty=0.02")
-    exact = [*bench_options, "--timing-uncertainty", "0"]
+    exact = ("--timing-uncertainty", "0")
     found = printed(path, *exact, *scales, "--position-scale-uncertainty=0.03")
     plain = printed(path, *exact)
     known, settings = plain["parameters"]["spring_constant"], found["settings"]
@@ -94,12 +100,12 @@ def test_calibration_reaches_settings_intervals_and_budget(printed, path, bench_
     assert budget["calibration"] == pytest.approx(error)
 
 
-def test_a_signature(printed, write_csv, columns_of, benches, bench_options):
+def test_a_signature(printed, write_csv, columns_of, benches):
     """By ``--method signature``, as the library identifies it."""
     pressure = TriangleWave().sample(np.arange(13_000) / 100)
     record = Recording(0.01, pressure, simulate(*benches["high"], pressure, 0.01).position)
     expected = identify_signature(record, BENCH_VALVE, SETTINGS)
-    answer = printed(write_csv(columns_of(record)), *bench_options, "--method", "signature")
+    answer = printed(write_csv(columns_of(record)), "--method", "signature")
     assert answer["method"] == "signature"
     assert values(answer) == pytest.approx(
         {name: none_for_nan(value) for name, value in expected.values.items()}, rel=1e-9
@@ -116,7 +122,9 @@ FALLING = replace(GRAPHITE_PACKING, mass=1.6, stribeck_velocity=3.26e-3)
 """A published identification of a graphite packing."""
 
 
-def test_a_fall_of_the_friction_is_told_with_its_speed(call, write_csv, columns_of, tmp_path):
+def test_a_fall_of_the_friction_is_told_with_its_speed(
+    call, printed, write_csv, columns_of, tmp_path
+):
     """Graphite packing: sixteen seconds of a sine at 100 Hz, 10 µm and 100 Pa of noise."""
     valve = tmp_path / "graphite.yaml"
     geometry = dataclasses.asdict(GRAPHITE_VALVE)
@@ -125,9 +133,7 @@ def test_a_fall_of_the_friction_is_told_with_its_speed(call, write_csv, columns_
     record = Recording(0.01, pressure, simulate(GRAPHITE_VALVE, FALLING, pressure, 0.01).position)
     path = write_csv(columns_of(SensorNoise(10e-6, 100.0, seed=1).applied_to(record)))
     options = (path, "--valve", valve, "--fix", "mass=1.6", "--method", "bench")
-    code, out, err = call(*options, "--json")
-    assert (code, err) == (0, "")
-    answer = json.loads(out)
+    answer = printed(*options)
     for name in ("coulomb_friction", "static_friction", "viscous_friction", "spring_constant"):
         entry, truth = answer["parameters"][name], getattr(FALLING, name)
         assert entry["verdict"] == "identified", name
@@ -158,11 +164,11 @@ def weak_csv(write_csv, benches, columns_of):
 
 
 @pytest.fixture
-def compared(call, weak_csv, quick_csv, bench_yaml):
+def compared(call, weak_csv, quick_csv):
     """Function of further options: exit code and output of the weak valve against the healthy."""
 
     def compared(*options):
-        files = (weak_csv, "--valve", bench_yaml, "--baseline-recording", quick_csv)
+        files = (weak_csv, "--baseline-recording", quick_csv)
         code, out, _ = call(*files, "--method", "bench", *options)
         return code, out
 
@@ -180,7 +186,7 @@ def test_json_and_exit_code(compared):
 
 
 def test_a_scale_of_the_sensor_qualifies_the_friction(
-    call, write_csv, columns_of, benches, quick_csv, bench_yaml, tmp_path
+    call, write_csv, columns_of, benches, quick_csv, tmp_path
 ):
     """In the text, in JSON and on the page, which plans no work on the packing."""
     valve, packing = benches["low"]
@@ -190,7 +196,7 @@ def test_a_scale_of_the_sensor_qualifies_the_friction(
     read = Recording(0.01, reference + 1.5 * (pressure - reference), position)
     path = write_csv(columns_of(read), "scaled.csv")
     page = tmp_path / "page.html"
-    options = ("--valve", bench_yaml, "--baseline-recording", quick_csv, "--method", "bench")
+    options = ("--baseline-recording", quick_csv, "--method", "bench")
     code, out, _ = call(path, *options, "--json", "--report", page)
     assert code == 0
     answer = json.loads(out)
@@ -219,9 +225,9 @@ def test_text_and_report(compared, tmp_path):
     assert row[3].startswith("0.667 times")
 
 
-def test_a_friction_that_is_given_says_nothing_of_the_spring(call, weak_csv, bench_options):
+def test_a_friction_that_is_given_says_nothing_of_the_spring(call, weak_csv):
     options = ("--baseline-coulomb-friction", "152.7", "--method", "bench", "--json")
-    code, out, _ = call(weak_csv, *bench_options, *options)
+    code, out, _ = call(weak_csv, *options)
     assert code == 0
     assert json.loads(out)["findings"] == []
 
@@ -276,31 +282,13 @@ def test_limits_out_of_order_are_refused(refusal, graphite_file):
 
 
 @pytest.fixture
-def call(command, bench_yaml):
-    """Function of arguments: exit code, stdout and stderr of `identify`."""
-    return partial(command, "identify", "--valve", bench_yaml)
-
-
-@pytest.fixture
-def answer(call):
-    """Function of arguments: the one JSON object of a success."""
-
-    def answer(*arguments):
-        code, out, err = call(*arguments, "--json")
-        assert (code, err) == (0, "")
-        return json.loads(out)
-
-    return answer
-
-
-@pytest.fixture
 def bag(tmp_path, quick_record):
     return write_bag(tmp_path / "bag", messages_of(quick_record))
 
 
 @pytest.fixture
-def csv_answer(answer, write_csv, columns_of, quick_record):
-    return answer(write_csv(columns_of(quick_record)))
+def csv_answer(printed, write_csv, columns_of, quick_record):
+    return printed(write_csv(columns_of(quick_record)))
 
 
 @pytest.fixture
@@ -317,20 +305,20 @@ def fleet(tmp_path, quick_record):
 
 class TestOneValve:
     @pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
-    def test_the_numbers_of_the_csv_file(self, answer, csv_answer, tmp_path, quick_record, storage):
+    def test_the_numbers_of_the_csv_file(
+        self, printed, csv_answer, tmp_path, quick_record, storage
+    ):
         bag = write_bag(tmp_path / storage, messages_of(quick_record), storage)
-        assert answer(bag) == csv_answer
-        assert answer(storage_file(bag)) == csv_answer
+        assert printed(bag) == csv_answer
+        assert printed(storage_file(bag)) == csv_answer
 
-    def test_a_refusal_tells_of_the_damage(self, call, tmp_path, quick_record):
+    def test_a_refusal_tells_of_the_damage(self, refusal, tmp_path, quick_record, bench_options):
         bag = write_bag(tmp_path / "bag", messages_of(quick_record), "sqlite3")
         file = storage_file(bag)
         file.write_bytes(file.read_bytes()[:40_000])
-        code, out, err = call(bag)
-        assert (code, out) == (2, "")
-        assert err.startswith(f"valve_friction identify: {bag}, /fv_101: the ")
-        assert "; bag.db3 is truncated or damaged (" in err
-        assert err.count("\n") == 1
+        told = refusal(bag, *bench_options)
+        assert told.startswith(f"{bag}, /fv_101: the ")
+        assert "; bag.db3 is truncated or damaged (" in told
 
     def test_without_ros(self, bag, bench_yaml):
         """As a process of its own, where no package of ROS can be imported."""
@@ -366,21 +354,15 @@ class TestSeveralValves:
         assert out.count("published: threshold") == 1
         assert err.count("\n") == 2
 
-    def test_one_of_them(self, answer, call, fleet, csv_answer):
-        assert answer(fleet, "--valve-name", "fv_101") == csv_answer
-        code, out, err = call(fleet, "--valve-name", "fv_103", "--json")
-        assert (code, out) == (2, "")
-        assert err == (
-            f"valve_friction identify: {fleet}, /fv_103: no sensor_msgs/msg/JointState topic "
-            "beside /fv_103/actuator_pressure\n"
-        )
+    def test_one_of_them(self, printed, refusal, fleet, csv_answer, bench_options):
+        assert printed(fleet, "--valve-name", "fv_101") == csv_answer
+        told = refusal(fleet, *bench_options, "--valve-name", "fv_103", "--json")
+        topic = "no sensor_msgs/msg/JointState topic beside /fv_103/actuator_pressure"
+        assert told == f"{fleet}, /fv_103: {topic}"
 
-    def test_a_picture_is_of_one(self, call, fleet, tmp_path):
-        code, out, err = call(fleet, "--plot", tmp_path / "fleet.png")
-        assert (code, out) == (2, "")
-        assert err == (
-            "valve_friction identify: --plot draws one valve: choose one of /fv_101, /fv_102, "
-            "/fv_103 with --valve-name\n"
+    def test_a_picture_is_of_one(self, call, refusal, fleet, tmp_path, bench_options):
+        assert refusal(fleet, *bench_options, "--plot", tmp_path / "fleet.png") == (
+            "--plot draws one valve: choose one of /fv_101, /fv_102, /fv_103 with --valve-name"
         )
         picture = tmp_path / "one.png"
         assert call(fleet, "--valve-name", "fv_101", "--plot", picture)[0] == 0
@@ -401,21 +383,15 @@ class TestSeveralValves:
         assert page.table("record")["source"] == (f"{fleet}, /fv_101",)
 
 
-class TestNoRecording:
-    """Whatever is wrong, exit code 2 and one line on stderr."""
-
-    @pytest.mark.parametrize(
-        ("options", "words"),
-        [
-            (["--joint", "plug"], "no joint 'plug' among stem"),
-            (["--pressure-topic", "/p"], "no sensor_msgs/msg/FluidPressure topic /p in it; it "),
-            (["--stem-topic", "stem"], "no sensor_msgs/msg/JointState topic stem in it; it holds"),
-            (["--valve-name", "fv_1"], "no valve /fv_1 in it; it holds /fv_101"),
-            (["--begin", "3", "--end", "2"], "a stretch cannot begin at 3 s and end at 2"),
-        ],
-    )
-    def test_options(self, call, bag, options, words):
-        code, out, err = call(bag, *options)
-        assert (code, out) == (2, "")
-        assert words in err
-        assert err.count("\n") == 1
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--joint", "plug"], "no joint 'plug' among stem"),
+        (["--pressure-topic", "/p"], "no sensor_msgs/msg/FluidPressure topic /p in it; it "),
+        (["--stem-topic", "stem"], "no sensor_msgs/msg/JointState topic stem in it; it holds"),
+        (["--valve-name", "fv_1"], "no valve /fv_1 in it; it holds /fv_101"),
+        (["--begin", "3", "--end", "2"], "a stretch cannot begin at 3 s and end at 2"),
+    ],
+)
+def test_no_recording(refusal, bag, bench_options, options, words):
+    assert words in refusal(bag, *bench_options, *options)

@@ -55,13 +55,14 @@ USAGE = (  # of which a kill may cost the last minute
 AGE = re.compile(r" \(identified \d+ (s|min) ago, before the restart\)")
 
 
-def test_an_alarm_outlives_a_kill(live):
+def test_an_alarm_outlives_a_kill(live, history):
     node = live.start_identifier()
     client = live.client
     client.set_baseline(HEALTHY)
     client.identified(TIGHT)
     before = client.statuses[-1][1]
     assert before.level == ERROR
+    client.wait_until(lambda: read_alarms(history, NODE), "the alarm in the file")
     node = live.restart()
     after = client.next_status()
     assert after.level == ERROR

@@ -124,7 +124,8 @@ def converse(client):
         GetTypeDescription.Request(type_name="none"),
     )
     assert not described.successful  # it knows no such type, and says so
-    assert "the stem ignores reversals smaller than" in client.identified(quick_record())
+    client.fill(quick_record())
+    assert "the stem ignores reversals smaller than" in client.success("identify")
     values = values_of(client.next_status())
     assert values["coulomb_friction verdict"] == "identified"
 

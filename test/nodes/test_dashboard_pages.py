@@ -448,6 +448,16 @@ def test_an_alarm_is_acknowledged_with_a_name_and_exported(identified, tab):
     identified.client.set_parameters(NODE, {"baseline_coulomb_friction": float("nan")})
 
 
+@pytest.fixture(scope="module")
+def many(plant):
+    """Alarms of four hundred valves in the history."""
+    shown = Condition(Level.ERROR, StatusSignal.FAILURE, "excess friction")
+    for number in range(400):
+        valve = KeptValve(f"/many/fv_{number}/identifier", f"MANY-{number}")
+        follow_alarms(plant.history, valve, {AlarmKind.FRICTION_HIGH: shown}, time.time_ns())
+
+
+@pytest.mark.usefixtures("many")
 @pytest.mark.parametrize(
     ("path", "line"),
     [
@@ -456,12 +466,8 @@ def test_an_alarm_is_acknowledged_with_a_name_and_exported(identified, tab):
         ("/?q=/many&view=tiles", ".vf-tile"),
     ],
 )
-def test_of_many_those_near_the_view_are_drawn(plant, tab, path, line):
+def test_of_many_those_near_the_view_are_drawn(tab, path, line):
     """All come as the page is scrolled."""
-    shown = Condition(Level.ERROR, StatusSignal.FAILURE, "excess friction")
-    for number in range(400):
-        valve = KeptValve(f"/many/fv_{number}/identifier", f"MANY-{number}")
-        follow_alarms(plant.history, valve, {AlarmKind.FRICTION_HIGH: shown}, time.time_ns())
     page = tab.open(path)
     lines = page.locator(line)
     page.get_by_text("more below").wait_for()

@@ -161,27 +161,24 @@ def test_lost_travel_is_said_though_its_record_is_refused(live, history, is_sche
     assert after.level == WARN
 
 
-def test_a_restored_baseline_brings_all_its_numbers_back(live):
+def test_limits_of_the_spring_and_a_restored_baseline_brings_all_its_numbers_back(live):
     client = live.client_of_identifier({"baseline_in_alarm": True})
     client.set_baseline(HEALTHY)
-    client.set_baseline(WEAK)
+    client.identified(WEAK)
+    assert client.statuses[-1][1].level == ERROR
+    assert client.set_parameters(NODE, {"spring_failure": 0.6})[0].successful
+    client.next_status(lambda one: one.level == WARN, "another limit")
+    assert client.set_parameters(NODE, {"spring_change": 0.5})[0].successful
+    client.next_status(lambda one: one.level == OK, "both limits")
+    (refused,) = client.set_parameters(NODE, {"spring_change": 0.7})
+    assert "spring_change < spring_failure" in refused.reason
+    assert client.trigger("set_baseline").success
     assert client.next_status(lambda one: one.level == OK, "a new baseline")
     live.restart({"baseline_in_alarm": True})
     assert client.next_status(lambda one: CHANGE in values_of(one), "the kept one").level == OK
     assert client.trigger("restore_baseline").success
     status = client.next_status(lambda one: one.level == ERROR, "the first baseline")
     assert "the spring constant has changed" in status.message
-
-
-def test_a_limit_is_a_parameter_and_a_given_friction_says_nothing_of_the_spring(live):
-    client = live.client_of_identifier({"spring_change": 0.5, "spring_failure": 0.6})
-    client.set_baseline(HEALTHY)
-    client.identified(WEAK)
-    assert client.statuses[-1][1].level == OK
-    (refused,) = client.set_parameters(NODE, {"spring_change": 0.7})
-    assert "spring_change < spring_failure" in refused.reason
-    client.set_parameters(NODE, {"spring_change": 0.15})
-    client.next_status(lambda one: one.level == WARN, "a tighter limit")
     client.set_parameters(NODE, {"baseline_coulomb_friction": 150.0})
     status = client.next_status(lambda one: one.level == OK, "a friction alone")
     assert CHANGE not in values_of(status)
@@ -238,19 +235,12 @@ def test_what_nobody_has_stated_is_said_until_somebody_does(live):
     assert values["coulomb_friction verdict"] == "identified"
     assert float(values["friction_ratio"]) == 1.0
 
-
-def test_stated_data_are_compared_with_the_record(live):
-    """The file of a valve says it as the file of a command does."""
+    # What is stated is compared with the record, as what the valve file of a command states.
     spring = LOW_FRICTION.spring_constant
-    client = live.client_of_identifier({"spring_constant": spring / 2, "mass": 1.542})
-    client.identified(quick_record())
-    values = client.last_values()
-    assert ("N/m from the record but stated as 102500 N/m: check diaphragm_area") in values[
-        "warnings"
-    ]
-    assert values["coulomb_friction verdict"] == "weak"
-    assert client.set_together(NODE, {"spring_constant": spring}).successful
-    client.identified(quick_record())
-    values = client.last_values()
-    assert "but stated as" not in values["warnings"]
-    assert values["coulomb_friction verdict"] == "identified"
+    told = "N/m from the record but stated as 102500 N/m: check diaphragm_area"
+    for stated, words, verdict in ((spring / 2, [told], "weak"), (spring, [], "identified")):
+        assert client.set_together(NODE, {"spring_constant": stated, "mass": 1.542}).successful
+        client.identified(quick_record())
+        values = client.last_values()
+        assert [one for one in (told, "but stated as") if one in values["warnings"]][:1] == words
+        assert values["coulomb_friction verdict"] == verdict

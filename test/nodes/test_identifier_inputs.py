@@ -15,10 +15,12 @@ import itertools
 import numpy as np
 import pytest
 from live_nodes import NAMESPACE, OK, START, STREAM, WARN, stamps_of, values_of
+from rclpy.duration import Duration
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from records import quick_record
 from sensor_msgs.msg import FluidPressure, JointState
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension, MultiArrayLayout, String
+from waiting import PATIENCE
 
 from valve_friction_ros.identification import identify
 from valve_friction_ros.model import BENCH_VALVE
@@ -155,6 +157,7 @@ def fed(client):
 def send(publisher, rows, size=50):
     for begin in range(0, len(rows), size):
         publisher.publish(block(rows[begin : begin + size]))
+    assert publisher.wait_for_all_acked(Duration(seconds=PATIENCE)), "not acknowledged"
 
 
 def is_warned(status):

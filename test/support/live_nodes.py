@@ -37,6 +37,7 @@ from std_msgs.msg import Float64, Float64MultiArray
 from std_srvs.srv import Trigger
 from waiting import PATIENCE
 
+from benchmark.harness.processes import parameters as as_arguments
 from benchmark.harness.run import Participant
 
 PROJECT = Path(__file__).resolve().parents[2]
@@ -54,7 +55,7 @@ STREAM = QoSProfile(depth=60_000, reliability=ReliabilityPolicy.RELIABLE)
 LATCHED = QoSProfile(
     depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
 )
-_BURST = 200
+_BURST = 400
 """Messages that are published at once; a transport's queue holds 512."""
 
 
@@ -95,9 +96,8 @@ class NodeProcess:
         script = ["-m", f"valve_friction_ros.nodes.{name}"] if script is None else script
         what = script if isinstance(script, list) else [str(script)]
         place = [] if namespace is None else ["-r", f"__ns:={namespace}"]
-        command = [sys.executable, *what, "--ros-args", *place, *arguments]
-        for key, value in (parameters or {}).items():
-            command += ["-p", f"{key}:={value}"]
+        given = as_arguments(**(parameters or {}))
+        command = [sys.executable, *what, "--ros-args", *place, *arguments, *given]
         path = os.pathsep.join(filter(None, [str(PROJECT), os.environ.get("PYTHONPATH")]))
         environment = os.environ | {"ROS_DOMAIN_ID": str(domain.number), "PYTHONPATH": path}
         environment["ROS_HOME"] = str(folder)
@@ -241,20 +241,20 @@ class Client(Participant):
         return response.message
 
     def identify_all(self, count):
-        """Identify once the buffer holds exactly `count` samples of both signals; the response.
+        """Identify until the buffer held exactly `count` samples of both signals; the response.
 
-        Each identification ends with a diagnostic, so this is quicker than waiting for the timer.
+        What has been acknowledged waits in the queue of the node, which takes all of it before it
+        identifies: the first time is the last, unless an executor of rclpy takes the samples.
         """
-        had_all = False
+
+        self.wait_for_acknowledgement()
 
         def answered():
-            nonlocal had_all
             before = len(self.statuses)
             response = self.trigger("identify")
             self.wait_until(lambda: len(self.statuses) > before, "the diagnostic")
-            complete = had_all
-            had_all = all(buffered(status) == count for _, status in self.statuses[before:])
-            return response if complete else None
+            are_all = all(buffered(status) == count for _, status in self.statuses[before:])
+            return response if are_all else None
 
         try:
             return self.wait_until(answered, f"{count} samples in the buffer")
@@ -416,12 +416,15 @@ class Client(Participant):
             if samples is not None
             for stamp, value in zip(*samples, strict=True)
         )
-        publishers = [publisher for publisher in (self._pressure, self._stem) if publisher]
         for begin in range(0, len(events), _BURST):
             for stamp, _, value, publish in events[begin : begin + _BURST]:
                 publish(stamp, value)
-            for publisher in publishers:
-                assert publisher.wait_for_all_acked(Duration(seconds=PATIENCE)), "not acknowledged"
+            self.wait_for_acknowledgement()
+
+    def wait_for_acknowledgement(self):
+        """Wait until the nodes have received all samples that were published."""
+        for publisher in filter(None, (self._pressure, self._stem)):
+            assert publisher.wait_for_all_acked(Duration(seconds=PATIENCE)), "not acknowledged"
 
     def send_record(self, record, start=START):
         """Publish both signals of `record` at its own stamps, the first at `start` ns."""
