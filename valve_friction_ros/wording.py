@@ -304,7 +304,7 @@ class Statement:
         try:
             code = Code[kept["code"]]
         except KeyError as unknown:
-            raise ValueError(f"{unknown} is no code of a statement") from None
+            raise ValueError(f"{unknown} is not a statement code") from None
         facts = {name: _restored(one) for name, one in kept.items() if name != "code"}
         return cls(code, facts)
 

@@ -304,7 +304,7 @@ class _Recognition(Look):
                     found.setdefault(cells)
             if len(found) > _MOST_TAGS:
                 raise ValueError(
-                    f"{self.raw.path}: more than {_MOST_TAGS} tags: name the --tag-column"
+                    f"{self.raw.path}: more than {_MOST_TAGS} tags: give the --tag-column"
                 )
         return list(found)
 
