@@ -359,7 +359,7 @@ def _advice(statement: Statement) -> str:
 
 
 def finding_advice(statement: Statement) -> str:
-    """Write what to do about a finding beside the friction; empty where nothing is known."""
+    """Write what to do about a finding besides the friction; empty where nothing is known."""
     return _advice(statement.innermost)
 
 

@@ -177,13 +177,14 @@ def print_plan(plan: StrokePlan, path: Path) -> None:
     low, high = plan.limits.lowest, plan.limits.highest
     lowest, highest = stem_limits(plan)
     console.print(
-        "Nothing has been moved. Before: agree with operations, put the loop in manual, keep "
-        f"people off the stem, and bring the pressure slowly to {test.pressures[0] / 1e3:.4g} kPa. "
+        "Nothing has been moved. Before the test: agree it with operations, put the loop in "
+        "manual, keep people away from the stem, and bring the pressure slowly to "
+        f"{test.pressures[0] / 1e3:.4g} kPa. "
         f"During the test: watch that the stem stays between {100 * lowest:.0f} and "
         f"{100 * highest:.0f} % of the travel ({100 * low:g} to {100 * high:g} % with the friction "
         "assumed). If it does not, or the process moves too far, abort: stroke_player returns to "
-        "the initial pressure; after stopping pressure_source, restore it by hand. After: "
-        "identify the record before the loop goes back to automatic."
+        "the initial pressure; after stopping pressure_source, restore it by hand. After "
+        "the test: identify the record before the loop goes back to automatic."
     )
     console.print(
         "Without ROS: --table writes the set points in %, mA and pressure for a control system, "

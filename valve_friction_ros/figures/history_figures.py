@@ -354,7 +354,7 @@ def usage_figure(usage: ValveUsage, is_narrow: bool = False) -> Figure:
     """Draw the time at each 5 % of travel, and the distance travelled on each of the last 31 days.
 
     Both cover the present packing only. A narrow page shows them one below the other. Raises
-    ValueError if the valve was not watched.
+    ValueError if the valve was not monitored.
     """
     used = usage.since_renewal
     if not used.time_watched:

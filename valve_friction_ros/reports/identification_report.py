@@ -88,7 +88,7 @@ def identification_report(record: IdentifiedRecord) -> Page:
 
     The page begins with status, diagnosis in one sentence, and date. Sections follow: parameters,
     uncertainty budget, friction and other numbers of the valve compared with the baseline, trend,
-    use, answer to the command, record, valve signature, evidence of the method, measured and
+    use, response to the command, record, valve signature, evidence of the method, measured and
     simulated position, residual, notes, settings and versions. Sections without content are left
     out.
     """
@@ -266,7 +266,7 @@ def usage_section(
     """Return table and figure of the usage, since the renewal of the packing and in total.
 
     With `limits`, add each limit of the packing and when it is expected to be reached. Return None
-    for a valve that was not watched.
+    for a valve that was not monitored.
     """
     used, everything = usage.since_renewal, usage.total
     if not everything.time_watched:

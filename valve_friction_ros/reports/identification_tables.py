@@ -158,8 +158,8 @@ def friction_table(record: IdentifiedRecord) -> PageTable:
             rows.append(
                 (
                     "calibration uncertainty",
-                    "left out of this comparison: the same area and sensors scale both frictions "
-                    "alike, which cancels in their ratio",
+                    "left out of this comparison: the same area and sensors scale both friction "
+                    "values alike, which cancels in their ratio",
                 )
             )
         rows += [
