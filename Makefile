@@ -1,4 +1,4 @@
-# `make help` lists what there is. Every target makes or reuses the virtual environment it needs.
+# `make help` lists the targets. Every target makes or reuses the virtual environment it needs.
 
 PYTHON ?= python3
 VENV ?= .venv
@@ -41,11 +41,11 @@ help:  ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*##  *\(.*\)/make \1|\2/p' Makefile | while IFS='|' read -r target text; do printf '%-16s %s\n' "$$target" "$$text"; done
 
 .PHONY: demo
-demo: $(if $(findstring --dashboard,$(DEMO_ARGS)),venv-dashboard,venv)  ## friction of a simulated valve grows, and is diagnosed, in under two minutes
+demo: $(if $(findstring --dashboard,$(DEMO_ARGS)),venv-dashboard,venv)  ## a simulated valve whose friction grows and is diagnosed, in under two minutes
 	@"$(VENV)/bin/valve_friction" demo $(DEMO_ARGS)
 
 .PHONY: test
-test: lint  ## lint, then all tests but the long ones; PYTEST_ARGS="-k name" for some
+test: lint  ## lint, then all tests except the long ones; PYTEST_ARGS="-k name" for some
 	@"$(VENV)/bin/python" -m pytest -n 2 --dist loadfile -m "not slow" $(PYTEST_ARGS)
 
 .PHONY: test-long
@@ -70,7 +70,7 @@ test-oldest:  ## some tests with the oldest versions that the package declares
 
 # ROS of a sourced installation would come before that of the wheels.
 .PHONY: test-kilted
-test-kilted:  ## the tests of the nodes with ROS 2 Kilted, from wheels
+test-kilted:  ## the node tests with ROS 2 Kilted, from wheels
 	@$(python-found)
 	@"$(PYTHON)" requirements/install.py "$(KILTED)" kilted
 	@env -u PYTHONPATH -u AMENT_PREFIX_PATH -u LD_LIBRARY_PATH RMW_IMPLEMENTATION=rmw_fastrtps_cpp \
@@ -83,32 +83,32 @@ lint: venv-test  ## ruff and mypy
 	@"$(VENV)/bin/mypy"
 
 .PHONY: format
-format: venv-test  ## rewrite the code in ruff's format, and repair what it can
+format: venv-test  ## reformat the code with ruff, and fix what it can
 	@"$(VENV)/bin/ruff" check --fix
 	@"$(VENV)/bin/ruff" format
 
 .PHONY: venv
-venv:  ## the virtual environment to run the package
+venv:  ## the virtual environment that runs the package
 	@$(python-found)
 	@$(INSTALL)
 
 .PHONY: venv-dashboard
-venv-dashboard:  ## the same, with what the dashboard needs
+venv-dashboard:  ## the same, plus what the dashboard needs
 	@$(python-found)
 	@$(INSTALL) dashboard
 
 .PHONY: venv-database
-venv-database:  ## the same, with what a history on a server needs
+venv-database:  ## the same, plus what a history on a server needs
 	@$(python-found)
 	@$(INSTALL) database
 
 .PHONY: venv-cluster
-venv-cluster:  ## the same, with what Dask clusters and object stores need
+venv-cluster:  ## the same, plus what Dask clusters and object stores need
 	@$(python-found)
 	@$(INSTALL) cluster
 
 .PHONY: venv-test
-venv-test:  ## the same, with what checks it
+venv-test:  ## the same, plus the test tools
 	@$(python-found)
 	@$(INSTALL) test
 
@@ -144,19 +144,19 @@ accuracy: venv  ## what the estimate reaches, in half an hour; ACCURACY_ARGS="--
 	@"$(VENV)/bin/python" -m benchmark.accuracy $(ACCURACY_ARGS)
 
 .PHONY: reality
-reality: venv  ## the estimate on drawn valves and sensors with imperfections, in half an hour; REALITY_ARGS=--brief for less
+reality: venv  ## the estimate on randomly generated valves and imperfect sensors, in half an hour; REALITY_ARGS=--brief for less
 	@OPENBLAS_NUM_THREADS=1 "$(VENV)/bin/python" -m benchmark.reality $(REALITY_ARGS)
 
 .PHONY: service
-service: venv  ## evidence of valves in closed-loop service, 1,000 hours and more; SERVICE_ARGS="--brief --hours 40" for less
+service: venv  ## evidence from valves in closed-loop service, 1,000 hours and more; SERVICE_ARGS="--brief --hours 40" for less
 	@OPENBLAS_NUM_THREADS=1 "$(VENV)/bin/python" -m benchmark.service $(SERVICE_ARGS)
 
 .PHONY: bench
-bench: venv  ## what each item costs beside its peers; BENCH_ARGS="--parts sweep" for some
+bench: venv  ## what each item costs, compared with its peers; BENCH_ARGS="--parts sweep" for some
 	@OPENBLAS_NUM_THREADS=1 "$(VENV)/bin/python" -m benchmark.speed $(BENCH_ARGS)
 
 .PHONY: churn
-churn: venv  ## nodes under clients that come and go for an hour; CHURN_ARGS="--minutes 5" for less
+churn: venv  ## nodes whose clients come and go for an hour; CHURN_ARGS="--minutes 5" for less
 	@"$(VENV)/bin/python" -m benchmark.churn $(CHURN_ARGS)
 
 .PHONY: soak
@@ -164,20 +164,20 @@ soak: venv  ## a month of a plant in an hour, each sample accounted for; SOAK_AR
 	@"$(VENV)/bin/python" -m benchmark.soak $(SOAK_ARGS)
 
 .PHONY: load
-load: venv-test browser  ## the dashboard before 500 valves in a real browser, 20 minutes; LOAD_ARGS="--valves 50" for less
+load: venv-test browser  ## the dashboard with 500 valves in a real browser, 20 minutes; LOAD_ARGS="--parts bounds" for some
 	@"$(VENV)/bin/python" -m benchmark.load $(LOAD_ARGS)
 
 .PHONY: hosts
-hosts: venv  ## a plant of five hosts, one of which dies and one is cut off, in network namespaces, as root; HOSTS_ARGS="--valves 100 --server"
+hosts: venv  ## a plant of five hosts, of which one dies and one is cut off, in network namespaces, as root; HOSTS_ARGS="--valves 100 --server"
 	@"$(VENV)/bin/python" -m benchmark.hosts $(HOSTS_ARGS)
 
 .PHONY: mutants
-mutants: venv-test  ## what the tests would not notice, in hours; MUTANTS_ARGS="--room trust --sample 100" for some
+mutants: venv-test  ## mistakes that the tests would not notice, takes hours; MUTANTS_ARGS="--room trust --sample 100" for some
 	@"$(VENV)/bin/python" -m pip install -q --no-deps --disable-pip-version-check -r requirements/mutants.txt
 	@"$(VENV)/bin/python" -m benchmark.mutants $(MUTANTS_ARGS)
 
 .PHONY: release-check
-release-check:  ## what a release still lacks: what only the owner knows, notices, versions
+release-check:  ## what a release still lacks: owner data, notices, versions
 	@$(python-found)
 	@"$(PYTHON)" .ci/release.py
 

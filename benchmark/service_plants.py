@@ -78,7 +78,7 @@ def _rests(c: Constants, pull: float, scale: float) -> bool:
 def _rest(
     c: Constants, loop: Loop, now: tuple[float, float, float, float], most: float, step: float
 ) -> tuple[float, float]:
-    """Return a time, s, over which the stem surely rests, and the pressure after it, Pa.
+    """Return a time, s, over which the stem clearly rests, and the pressure after it, Pa.
 
     The state `now` is position, pressure, its target, and the scale of friction. The pressure is
     monotonic until the next event, so a stem that rests at the end rests before it. If the time is

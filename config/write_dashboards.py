@@ -91,7 +91,7 @@ def valve_layout(valve: str) -> fox.Layout:
         (1, _plot("Pressure", pressure)),
         (1, _plot("Stem", stem)),
         (1, _plot("Friction", friction, seconds=None)),
-        (1, _plot("Friction over its baseline", ratio, seconds=None)),
+        (1, _plot("Friction ratio to baseline", ratio, seconds=None)),
     )
     return fox.Layout(
         content=_split("row", (2, left), (1, _split("column", (3, detail), *buttons)))

@@ -57,7 +57,7 @@ def nodes(context: LaunchContext) -> list[Node]:
         names.append("identifier")
     config = LaunchConfiguration("config").perform(context)
     if not Path(config).is_file():
-        raise ValueError(f"config '{config}' is no file: give the path of a parameter file")
+        raise ValueError(f"config '{config}' is not a file: give the path of a parameter file")
     time = {"use_sim_time": ParameterValue(LaunchConfiguration("use_sim_time"), value_type=bool)}
     return [
         Node(

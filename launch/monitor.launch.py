@@ -66,7 +66,7 @@ def listed(text: str) -> list[tuple[str, Any]]:
         found: Any = text.replace(",", " ").split()
     else:
         if not Path(text).is_file():
-            raise ValueError(f"valves '{text}' is no file: give its path, or a list of valves")
+            raise ValueError(f"valves '{text}' is not a file: give its path, or a list of valves")
         try:
             found = yaml.safe_load(Path(text).read_text(encoding="utf-8")) or []
         except (yaml.YAMLError, UnicodeDecodeError) as error:
@@ -75,7 +75,7 @@ def listed(text: str) -> list[tuple[str, Any]]:
         if not isinstance(found, list | dict):
             raise ValueError(f"valves '{text}' holds no valves: write a line such as 'fv_101:'")
     if not found:
-        raise ValueError("no valve given: name at least one, as in valves:=fv_101,fv_102")
+        raise ValueError("no valve given: give at least one, as in valves:=fv_101,fv_102")
     if isinstance(found, dict):
         return [(str(name), topics or {}) for name, topics in found.items()]
     return [(str(name), {}) for name in found]
@@ -87,14 +87,14 @@ def plant_valves(text: str, usual: dict[str, str]) -> list[PlantValve]:
     for name, given in listed(text):
         if not NAMESPACE.fullmatch(name):
             raise ValueError(
-                f"valve '{name}' is no ROS namespace: use letters, digits and underscores, "
-                "as in valves:=fv_101,fv_102"
+                f"valve '{name}' is not a ROS namespace: use letters, digits and underscores, as "
+                "in valves:=fv_101,fv_102"
             )
         if not isinstance(given, dict) or (unknown := sorted(map(str, set(given) - set(INPUTS)))):
             what = f"the unknown key '{unknown[0]}'" if isinstance(given, dict) else f"'{given}'"
             raise ValueError(
-                f"valve '{name}' has {what}: use {' and '.join(INPUTS)}; "
-                "parameters of one valve stand in the config"
+                f"valve '{name}' has {what}: use {' and '.join(INPUTS)}; put parameters of single "
+                "valves into the config"
             )
         place = name.strip("/")
         topics = {
@@ -104,8 +104,8 @@ def plant_valves(text: str, usual: dict[str, str]) -> list[PlantValve]:
         for key, topic in topics.items():
             if not TOPIC.fullmatch(topic):
                 raise ValueError(
-                    f"{key} '{topic}' of valve '{name}' is no topic: use letters, digits, "
-                    "underscores and slashes, and {valve} for the name of the valve"
+                    f"{key} '{topic}' of valve '{name}' is not a topic name: use letters, digits, "
+                    f"underscores and slashes, and {{valve}} for the name of the valve"
                 )
         if f"/{place}" in valves:
             raise ValueError(f"valve '{name}' is listed twice: name each valve once")
@@ -129,7 +129,9 @@ def identifiers(context: LaunchContext) -> list[Node]:
 
     require_known(context)
     if not Path(argument("config")).is_file():
-        raise ValueError(f"config '{argument('config')}' is no file: give that of a parameter file")
+        raise ValueError(
+            f"config '{argument('config')}' is not a file: give the path of a parameter file"
+        )
     valves = plant_valves(argument("valves"), {name: argument(name) for name in INPUTS})
     use_sim_time = ParameterValue(LaunchConfiguration("use_sim_time"), value_type=bool)
     shared = {"use_sim_time": use_sim_time}
@@ -206,7 +208,7 @@ ARGUMENTS = {
     ),
     "respawn": (
         "true",
-        "false to leave a process ended that has ended by itself.",
+        "false to leave a process stopped once it has ended by itself.",
         YES_OR_NO,
     ),
     "log_level": ("info", "Of the nodes.", ["debug", "info", "warn", "error", "fatal"]),

@@ -203,7 +203,7 @@ def identify_width(recording, valve, settings=None):
         rms=math.nan,
         misfit=None,
         derivative_window=0,
-        warnings=("a width is no model",),
+        warnings=("a width is not a model",),
         evidence={"strokes": 3},
         findings=("the loop is wide",),
         exhibit=Width(friction),
@@ -255,7 +255,7 @@ def test_its_report(result):
     page = identification_report(IdentifiedRecord("FV-1", "made up", result, Baseline(40.0)))
     assert "Half width of the loop" in [section.title for section in page.sections]
     text = render(page)
-    for words in ("by stroke.", "strokes used", "a width is no model", "Published method"):
+    for words in ("by stroke.", "strokes used", "a width is not a model", "Published method"):
         assert words in text
 
 

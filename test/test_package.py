@@ -360,8 +360,8 @@ def test_the_dashboard_is_started_on_request(monitor, asked, started):
         ("", "no valve given"),
         ("fv_101 fv_101", "'fv_101' is listed twice"),
         ("fv_101,/fv_101", "'/fv_101' is listed twice"),
-        ("fv-101", "'fv-101' is no ROS namespace"),
-        ("missing.yaml", "'missing.yaml' is no file"),
+        ("fv-101", "'fv-101' is not a ROS namespace"),
+        ("missing.yaml", "'missing.yaml' is not a file"),
     ],
 )
 def test_wrong_lists_of_valves(monitor, text, words):
@@ -375,8 +375,11 @@ def test_wrong_lists_of_valves(monitor, text, words):
         ("fv_101: {topic: /x101}", "unknown key 'topic': use pressure_topic and stem_topic"),
         ("fv_101: /x101", "'fv_101' has '/x101': use pressure_topic and stem_topic"),
         ("fv_101: 5", "'fv_101' has '5': use pressure_topic and stem_topic"),
-        ("fv_101: {stem_topic: }", "stem_topic '' of valve 'fv_101' is no topic"),
-        ("fv_101: {stem_topic: '/{tag}/x'}", "stem_topic '/{tag}/x' of valve 'fv_101' is no topic"),
+        ("fv_101: {stem_topic: }", "stem_topic '' of valve 'fv_101' is not a topic name"),
+        (
+            "fv_101: {stem_topic: '/{tag}/x'}",
+            "stem_topic '/{tag}/x' of valve 'fv_101' is not a topic name",
+        ),
         ("fv_101", "holds no valves: write a line such as 'fv_101:'"),
         ("fv_101: {stem_topic: /x", "cannot be read as YAML: while parsing a flow mapping in"),
     ],

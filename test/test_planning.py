@@ -564,7 +564,7 @@ def test_it_does_not_start_on_signals_that_would_end_it(stem, pressure, cause):
     hear(test, 100.0, stem, pressure)
     with pytest.raises(RefusalError, match=cause) as refusal:
         test.start(100.0)
-    assert str(refusal.value).startswith("nothing is played: ")
+    assert str(refusal.value).startswith("not started: ")
     assert test.step(100.0) is None
 
 

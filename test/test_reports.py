@@ -141,7 +141,7 @@ def test_a_weak_or_a_given_number_is_called_so(with_friction):
 
 def test_what_is_not_identifiable_has_no_number(with_friction):
     record = with_friction(NAN, NAN, Verdict.NOT_IDENTIFIABLE, "too few strokes", baseline=BASELINE)
-    told = "This record does not determine the friction (too few strokes): move the valve through"
+    told = "This record does not determine the friction (too few strokes): stroke the valve quickly"
     assert diagnosis_sentence(record).startswith(told)
 
 
@@ -192,7 +192,9 @@ def test_excess_friction_has_the_interval_of_both(with_friction):
     told = rows(with_friction(150.0, 3.0, baseline=Baseline(100.0, 4.0)), FRICTION)
     assert told["friction of the healthy valve (baseline)"] == ("Coulomb friction 100.0 ± 4.0 N",)
     assert told["excess friction"] == ("+50.0 ± 5.0 N",)
-    assert told["friction over baseline"][0].startswith("Coulomb friction: 1.50, 95 % interval: ")
+    assert told["friction ratio to baseline"][0].startswith(
+        "Coulomb friction: 1.50, 95 % interval: "
+    )
     assert told["level"] == ("WARN, NE 107 status signal M",)
 
 
@@ -200,14 +202,16 @@ def test_without_a_baseline_nothing_is_said_of_excess(with_friction):
     record = with_friction(150.0, 3.0)
     assert "excess friction" not in rows(record, FRICTION)
     words = blocks(record, FRICTION)[0].text
-    assert words.startswith("Excess friction is unknown, because this valve has no baseline")
+    assert words.startswith(
+        "Whether friction is excessive is unknown, because this valve has no baseline"
+    )
     assert "nothing on this page says that the valve is healthy" in words
     assert rows(record, FRICTION)["level"][0].startswith("unknown: nothing was compared")
 
 
 def test_what_is_not_identifiable_has_no_ratio(with_friction):
     record = with_friction(NAN, NAN, Verdict.NOT_IDENTIFIABLE, "too short", baseline=BASELINE)
-    assert not {"excess friction", "friction over baseline"} & set(rows(record, FRICTION))
+    assert not {"excess friction", "friction ratio to baseline"} & set(rows(record, FRICTION))
     told = rows(record, "Parameters")["Coulomb friction F_c [N]"]
     assert told[:3] == ("–", "–", "not identifiable: too short")
 
@@ -231,12 +235,12 @@ def test_what_the_valve_has_done(identified):
     told = rows(used, "Use")
     assert told["travelled distance [m]"] == ("1.5", "3")
     assert told["reversals"] == ("12", "23")
-    assert told["time watched [h]"] == ("24", "48")
+    assert told["time monitored [h]"] == ("24", "48")
     assert told["time near 0 % of the travel [h]"] == ("24", "48")
     assert told["time near 100 % of the travel [h]"] == ("0", "0")
     table, picture, words = blocks(used, "Use")
     assert picture.kind == "picture"
-    assert "1.5 m and 12 reversals per day watched" in words.text
+    assert "1.5 m and 12 reversals per day monitored" in words.text
     assert table.columns[1].title == "since the packing was renewed, 1970-01-03"
     assert "Use" not in [one.title for one in identification_report(identified).sections]
 
@@ -260,7 +264,7 @@ def test_the_limits_of_a_packing(identified):
     assert "replace the packing, then call ~/reset_usage" in warning.text
     reached = limit_states(usage.since_renewal, None, UsageLimits(3.0, 1e6), 2 * day)
     _, table, *_ = told(reached)
-    assert [row[-1] for row in table.rows] == ["reached", "not known before a day of watching"]
+    assert [row[-1] for row in table.rows] == ["reached", "not known before a day of monitoring"]
     assert "has no limit: set the parameter travel_limit" in told(())[1].text
     assert [block.kind for block in told(None)] == ["table", "picture", "paragraph"]
 
@@ -349,11 +353,11 @@ class TestUncertaintyBudget:
         assert told["relative standard uncertainty of the diaphragm area"] == ("2 %",)
         assert not [name for name in told if "sensor" in name]
         told, before = (rows(one, FRICTION) for one in (wide, record))
-        (words,) = told.pop("uncertainty of the calibration")
+        (words,) = told.pop("calibration uncertainty")
         assert words.startswith("left out of this comparison: the same area and sensors")
-        for name in ("excess friction", "friction over baseline", "level"):
+        for name in ("excess friction", "friction ratio to baseline", "level"):
             assert told[name] == before[name]
-        assert "uncertainty of the calibration" not in before
+        assert "calibration uncertainty" not in before
 
 
 @pytest.mark.parametrize(
@@ -422,7 +426,10 @@ def test_autocorrelation_of_what_is_known():
     ("name", "reason"),
     [
         ("report.pdf", "a report is an HTML page: give it a name that ends in .html"),
-        ("nowhere/report.html", "there is no folder {folder}/nowhere: create it, or name another"),
+        (
+            "nowhere/report.html",
+            "there is no folder {folder}/nowhere: create it, or choose another",
+        ),
         ("folder.html", "this is a folder: give the report another name"),
     ],
 )

@@ -175,13 +175,13 @@ class Webhook:
             raise ValueError(f"{name} is not an address: write https://host/path")
         if parts.username is not None or parts.password is not None:
             raise ValueError(
-                f"{name} holds a name or a password, which everyone on the ROS graph can read: "
+                f"{name} contains a name or a password, which everyone on the ROS graph can read: "
                 f"put a token into the environment variable {_TOKEN}"
             )
         if parts.scheme == "http" and not is_loopback(host):
             raise ValueError(
-                f"{name} uses http to another machine, where anyone on the path can read and "
-                "change it: use https, or a relay on this machine"
+                f"{name} uses http to another machine, where anyone in between can read and change "
+                "it: use https, or a relay on this machine"
             )
         target = (parts.path or "/") + (f"?{parts.query}" if parts.query else "")
         return cls(parts.scheme, host, _PORTS[parts.scheme] if port is None else port, target)

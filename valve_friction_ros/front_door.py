@@ -82,7 +82,7 @@ def read_recording(
     recorded = read_recordings(Path(source), valve or Valve(), options)
     names = ", ".join(each.name for each in recorded)
     if name is None and len(recorded) > 1:
-        raise ValueError(f"{source}: several valves ({names}): choose one by name=")
+        raise ValueError(f"{source}: several valves ({names}): choose one with name=")
     for each in recorded:
         if name is None or each.name.strip("/") == name.strip("/"):
             return each.recording()

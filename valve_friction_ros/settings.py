@@ -197,7 +197,7 @@ class _Karnopp:
 
 class _Identification:
     method = Setting(DEFAULT_METHOD, choices=METHOD_NAMES, option="--method", spell=current_name)
-    """Identification method [-]: plant fits the imperfections of a plant too; bench fits the
+    """Identification method [-]: plant also fits the imperfections of a plant; bench fits the
     Karnopp model alone; published is the regression of the paper; signature needs two periods of a
     slow triangle in the window."""
     derivative_window = Setting(0, (0, 100_001), option="--derivative-window")
@@ -205,8 +205,8 @@ class _Identification:
     chosen from the noise of each record for the method signature."""
     timing_uncertainty = Setting(None, option="--timing-uncertainty")
     """Standard deviation of the total lag between the signals [s]: clocks, transmitters, the volume
-    ahead of the diaphragm; unset: 0.04, a plant without special care, and 0 for the method bench;
-    0: the signals are known to be synchronous."""
+    ahead of the diaphragm; unset: 0.04 for a plant without special measures, and 0 for the method
+    bench; 0: the signals are known to be synchronous."""
     polynomial_order = Setting(IdentificationSettings.order, (2, 20), option="--order")
     """Order n of the derivative polynomial [-]."""
     position_bias = Setting(None, option="--position-bias")
@@ -234,7 +234,7 @@ class _Identifier:
     input_timeout = Setting(3.0, (0.1, 86400.0))
     """Time without a message after which an input is reported as silent [s]."""
     clock_tolerance = Setting(60.0, (0.0, 1e9))
-    """Difference between stamps and the clock of the node above which it is reported [s]; 0: never,
+    """Difference between stamps and the node's clock above which a fault is reported [s]; 0: never,
     as for recordings played without /clock."""
     identification_limit = Setting(600.0, (1.0, 86400.0))
     """Time after which an unfinished identification is reported as stuck [s]."""
@@ -313,7 +313,7 @@ class _Identifier:
     reversal_limit = Setting(0.0, (0.0, 1e12))
     """Reversals over the life of a packing [-]; 0: no limit."""
     alarm_recording = Setting(10.0, (0.0, 600.0))
-    """Time after a rise of the level at which the buffer, before and after it, is saved [s]; 0:
+    """Time after a rise of the level until the buffer, from before and after it, is saved [s]; 0:
     never."""
     alarm_folder = Setting("", read_only=True)
     """Folder of these recordings [-]; empty: valve_friction_ros/alarms under ROS_HOME, or under
@@ -365,7 +365,7 @@ class _Identifiers:
     threads of this process."""
     parameter_services = Setting(True, read_only=True)
     """Whether parameters of the valves can be read and changed at run time, and their alarms
-    answered by services [-]; off for more than 20 valves unless set, as it doubles the cost of
+    acknowledged by services [-]; off for more than 20 valves unless set, as it doubles the cost of
     starting a process."""
 
 
@@ -449,7 +449,7 @@ class _Dashboard:
     session_hours = Setting(_Of("dashboard.accounts", "Access.session_hours"), (0.1, 10000.0))
     """Time after which a session ends [h]."""
     session_file = Setting("")
-    """File that keeps sessions over a restart [-]; empty: they end with it."""
+    """File that keeps sessions across a restart [-]; empty: a restart ends them."""
     port = Setting(_Of("dashboard", "DashboardOptions.port"), (1, 65535))
     """Port to listen on [-]."""
     history_file = Setting(str(history_file()))

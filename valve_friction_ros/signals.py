@@ -234,7 +234,7 @@ by chance in 3 of 100,000 windows."""
 def _peaks(signal: NDArray[np.float64], least: float, distance: int) -> NDArray[np.intp]:
     """Find local maxima of at least `least`; of those nearer than `distance`, keep the highest.
 
-    The maximum of a plateau is its middle. The ends of the signal are no maxima.
+    The maximum of a plateau is its middle. The ends of the signal are not maxima.
     """
     begins = np.flatnonzero(np.diff(signal, prepend=np.nan))
     levels = signal[begins]

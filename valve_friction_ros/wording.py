@@ -304,7 +304,7 @@ class Statement:
         try:
             code = Code[kept["code"]]
         except KeyError as unknown:
-            raise ValueError(f"{unknown} is no code of a statement") from None
+            raise ValueError(f"{unknown} is not a statement code") from None
         facts = {name: _restored(one) for name, one in kept.items() if name != "code"}
         return cls(code, facts)
 
@@ -359,7 +359,7 @@ def _advice(statement: Statement) -> str:
 
 
 def finding_advice(statement: Statement) -> str:
-    """Write what to do about a finding beside the friction; empty where nothing is known."""
+    """Write what to do about a finding besides the friction; empty where nothing is known."""
     return _advice(statement.innermost)
 
 

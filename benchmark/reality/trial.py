@@ -29,7 +29,7 @@ from benchmark.reality.records import Case, Record, TrueValue, make_record
 
 _WINDOW = 0.15
 _SURELY = 0.2
-"""Length of the filter, s, and share of the top speed above which the stem surely slides."""
+"""Length of the filter, s, and share of the top speed above which the stem clearly slides."""
 
 
 def sliding_friction(record: Record) -> float:

@@ -77,7 +77,7 @@ def run(options: argparse.Namespace) -> int:
     """Run the programme and write the report."""
     benches = _benches(options)
     if options.output.exists() and not options.output.is_dir():
-        raise ValueError(f"{options.output}: is no folder: give --output another name")
+        raise ValueError(f"{options.output}: not a folder: give --output another name")
     options.output.mkdir(parents=True, exist_ok=True)
     with Progress(
         TextColumn("{task.description}"),

@@ -156,7 +156,7 @@ class TestReport:
     def test_a_missed_tolerance_and_a_friction_that_was_not_diagnosed(self, report, outcome):
         code, words = report([outcome(), outcome("tight", mass=-0.2)], Level.ERROR)
         assert code == 1
-        assert "outside the tolerance: mass (tight)" in words
+        assert "outside tolerance: mass (tight)" in words
         code, words = report([outcome(), outcome("tight")], Level.WARN)
         assert code == 1
         assert "/diagnostics WARN: excess friction" in words

@@ -166,7 +166,7 @@ def test_nothing_is_replaced_unasked(refused, described, tmp_path):
     given = options({"area": "690cm2", "travel": "28mm"})
     described("--yes", *given)
     told = refused("describe-valve", "--yes", *given, "--output", tmp_path / "fv_101.yaml")
-    assert told.endswith("it exists already: give another name, or --replace")
+    assert told.endswith("it already exists: give another name, or --replace")
     described("--yes", "--replace", *given)
 
 

@@ -96,7 +96,7 @@ def test_the_rows_of_the_folder_on_disk(arguments, stored, folder, tmp_path, com
     assert rows == of_disk
     assert rows.keys() == {"bag", "broken.csv", "force.csv", "unit 1/a#1.csv"}
     assert {name for name, row in rows.items() if row["error"]} == {"broken.csv"}
-    assert "skipped, no recordings: .hidden.csv, notes.txt" in err
+    assert "skipped, not recordings: .hidden.csv, notes.txt" in err
 
     fsspec.filesystem("s3").pipe("plants/north/broken.csv", SHORT.encode())
     _, _, err = command(*arguments)

@@ -276,7 +276,7 @@ class TestErrors:
         for number in range(13):
             history.add(success(valve=VALVE._replace(name=f"/fv_{number}/identifier")))
         result = run("--plot", tmp_path / "many.png", path=history.path)
-        self.refused(result, "one to 12 valves can be drawn, got 13: choose some by --valve")
+        self.refused(result, "one to 12 valves can be plotted, got 13: choose some with --valve")
 
 
 def test_the_default_file():

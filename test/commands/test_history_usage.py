@@ -49,7 +49,7 @@ def test_below_the_list(run, monkeypatch):
     monkeypatch.setenv("COLUMNS", "160")
     code, output, errors = run()
     assert (code, errors) == (0, "")
-    figures = "{} m of travel, {} reversals, {} breakaways in {} h watched"
+    figures = "{} m of travel, {} reversals, {} breakaways in {} h monitored"
     lines = output.splitlines()
     new = figures.format("1.5", 10, 4, 21)
     assert f"usage: {new}, since 2026-09-23 (packing renewed)" in lines
@@ -82,7 +82,7 @@ def test_days(run, monkeypatch):
     assert "2026-09-23 1.5 10 4 21 1 20 2026-09-23" in lines
     code, output, _ = run("--usage", "--valve", "FV-101", "--until", "2026-09-22")
     assert code == 0
-    total = "3 m of travel, 20 reversals, 8 breakaways in 42 h watched, from 2026-09-21 to"
+    total = "3 m of travel, 20 reversals, 8 breakaways in 42 h monitored, from 2026-09-21 to"
     assert total in output
     assert "in all" not in output
 
@@ -105,7 +105,7 @@ def test_days_in_json_and_csv(run, tmp_path):
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (["--usage", "--plot", "x.png"], "--usage: neither --plot nor --fail-on"),
+        (["--usage", "--plot", "x.png"], "--usage: cannot be combined with --plot"),
         (["--usage", "--since", "2027-01-01"], "no usage of these valves within these times"),
     ],
 )

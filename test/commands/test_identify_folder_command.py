@@ -156,7 +156,7 @@ def test_a_folder_of_everything(folder, output, arguments, texts, noisy, bench_y
     tables = ("broken.csv", "packed.csv.gz", "unit_1/one.csv")
     valves = [("bag", "/fv_101"), ("bag", "/fv_102"), *((name, "") for name in tables)]
     assert done(output) == Counter(valves)
-    assert "skipped, no recordings: .hidden.csv, notes.txt" in err
+    assert "skipped, not recordings: .hidden.csv, notes.txt" in err
     assert "broken.csv: row 2, column 'position_m': 'abc' is not a valid value" in err
     counts = [line.split() for line in out.splitlines()[1:3]]
     assert counts == [["identified", "4"], ["refused", "1"]]

@@ -91,7 +91,7 @@ class TestPlot:
     @pytest.mark.parametrize(
         ("name", "message"),
         [
-            ("record.xyz", "the ending is not a picture format; choose .png, .pdf or .svg"),
+            ("record.xyz", "the extension is not a picture format; choose .png, .pdf or .svg"),
             ("no/record.png", "there is no folder"),
         ],
     )
@@ -321,7 +321,7 @@ def test_records(refusal, write_csv, columns_of, quick_record, bench_options, ch
 
 def test_no_valve_file_for_a_pressure(refusal, quick_csv):
     assert refusal(quick_csv).startswith(
-        "pressure needs the diaphragm_area: give a valve file by --valve; "
+        "pressure needs the diaphragm_area: give a valve file with --valve; "
     )
 
 

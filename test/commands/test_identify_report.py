@@ -224,7 +224,7 @@ def test_a_machine_without_a_spring_has_no_residual(reported, write_csv, columns
     ("options", "reason"),
     [
         ("--report r.pdf", "r.pdf: a report is an HTML page: give it a name that ends in .html"),
-        ("--report no/r.html", "no/r.html: there is no folder no: create it, or name another"),
+        ("--report no/r.html", "no/r.html: there is no folder no: create it, or choose another"),
         ("--baseline-half-width 2", "--baseline-half-width: give the baseline itself with --b"),
         ("--baseline-coulomb-friction 0", "baseline_coulomb_friction must be above zero, got 0"),
         ("--baseline-recording a --baseline-half-width 2", "--baseline-recording provides the b"),

@@ -323,7 +323,7 @@ def test_a_piped_password(monkeypatch, capsys):
 
 @pytest.mark.parametrize(
     ("name", "password", "words"),
-    [("anna", "short", "10 to 200 characters"), ("an na", PASSWORD, "the name of an account")],
+    [("anna", "short", "10 to 200 characters"), ("an na", PASSWORD, "an account name must")],
 )
 def test_what_is_refused(monkeypatch, refused, name, password, words):
     monkeypatch.setattr(sys, "stdin", io.StringIO(f"{password}\n"))

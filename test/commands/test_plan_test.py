@@ -192,7 +192,7 @@ class TestWithoutRos:
         text = form.read_text()
         assert "ABORT" in text
         assert "valve 31-FV 7   date" in text
-        assert "of the travel, counted from its end without air," in text
+        assert "of the travel, measured from the end without air," in text
         assert f"{float(rows[0]['abort_above_mm']):.1f} mm" in text
 
     def test_table_and_form_in_psi_and_inch(self, plan, tmp_path, capsys):

@@ -56,7 +56,7 @@ class TestTables:
         ("start", "piece", "cause"),
         [
             (b"", bytes(10_000_000), "a line has more than 1048576 bytes"),
-            (ROWS, b"\n" * 10_000_000, "65536 blank rows in succession"),
+            (ROWS, b"\n" * 10_000_000, "65536 consecutive blank rows"),
             (ROWS, b",,,remark\n" * 1_000_000, "more than 20 MB, unpacked: raise maximum_megaby"),
             (
                 b"0.0,0,1e5\nx,0,1e5\n",

@@ -115,10 +115,10 @@ def test_a_file_that_others_can_read_is_refused(tmp_path, mode):
         ("{anna}\n{anna}", "line 2: 'anna' is given twice"),
         ("anna operate", "line 1: not NAME, role"),
         ("anna admin {hash}", "line 1: not NAME, role"),
-        ("an/na view {hash}", "line 1: the name of an account"),
+        ("an/na view {hash}", "line 1: an account name must"),
         ("anna view plaintext-password", "line 1: not a usable password hash"),
-        ("# nobody", "holds no account"),
-        ("", "holds no account"),
+        ("# nobody", "contains no account"),
+        ("", "contains no account"),
     ],
 )
 def test_wrong_files(tmp_path, text, words):
@@ -155,10 +155,10 @@ def test_this_machine_needs_no_account(host):
 @pytest.mark.parametrize("host", ["0.0.0.0", "::", "10.1.2.3", "fd00::1", "plant.example", ""])
 def test_any_other_address_needs_accounts(host):
     with pytest.raises(
-        ValueError, match="there are no accounts: make one with `valve_friction dash"
+        ValueError, match="there are no accounts: create one with `valve_friction dash"
     ):
         Access(host)
-    assert "passwords and sessions can be read on the way" in Access(host, accounts=(ANNA,)).warning
+    assert "passwords and sessions can be read in transit" in Access(host, accounts=(ANNA,)).warning
 
 
 def test_a_name_for_others_needs_accounts():

@@ -71,7 +71,7 @@ class Visit:
 
 def test_who_may_not_operate_calls_nothing():
     visit = Visit("bo", False)
-    assert visit.press() == (False, "your account may not operate: log in with one that may")
+    assert visit.press() == (False, "your account may only view: log in with one that may operate")
     assert visit.called == visit.logged == []
     visit.may = True
     assert visit.press().success

@@ -298,7 +298,7 @@ def test_all_good_is_said_of_good_valves_only():
     assert summary({"error": 1, "unknown": 2, "ok": 1, "unheard": 3}) == (
         "7 valves: 1 error, 2 unknown, 3 not heard"
     )
-    assert summary({"ok": 0}) == "No valve yet"
+    assert summary({"ok": 0}) == "No valves yet"
 
 
 def test_what_only_the_history_knows_comes_last(plant):

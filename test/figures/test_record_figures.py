@@ -323,7 +323,7 @@ class TestPictures:
     @pytest.mark.parametrize(
         ("name", "words"),
         [
-            *((one, "the ending is not a picture format; choose .png, .pdf or .svg")
+            *((one, "the extension is not a picture format; choose .png, .pdf or .svg")
               for one in ("figure", "figure.", "figure.csv", "figure.bmp", "png")),
             ("none/figure.png", "there is no folder"),
         ],

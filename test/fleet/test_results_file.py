@@ -176,7 +176,7 @@ def test_another_database_is_left_alone(tmp_path):
         other.execute("CREATE TABLE result (name)")
     other.close()
     before = database_of(path).read_bytes()
-    with pytest.raises(ValueError, match="results of another version: give another output"):
+    with pytest.raises(ValueError, match="results of another version: use another output"):
         ResultsFile(path)
     database_of(path).write_bytes(b"no database at all" * 100)
     with pytest.raises(ValueError, match="file is not a database"):

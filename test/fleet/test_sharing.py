@@ -178,7 +178,9 @@ def test_the_scheduler_goes(tmp_path):
                 closing.start()
             return False
 
-        with pytest.raises(ValueError, match="the scheduler is gone: once it is back, run the"):
+        with pytest.raises(
+            ValueError, match="the scheduler has disappeared: once it is back, run the"
+        ):
             list(in_cluster(found, answer, [f"wait {begun}", *"abc"], stopped))
         closing.join()
 

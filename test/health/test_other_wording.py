@@ -144,7 +144,7 @@ def test_what_is_kept_is_restored_word_by_word(life):
 
 
 def test_an_unknown_code_is_named():
-    with pytest.raises(ValueError, match="'FROM_LATER' is no code of a statement"):
+    with pytest.raises(ValueError, match="'FROM_LATER' is not a statement code"):
         Statement.from_dict({"code": "FROM_LATER"})
 
 

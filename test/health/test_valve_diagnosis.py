@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""What has changed on a valve beside its friction: bounds, causes, and whole identifications."""
+"""What has changed on a valve besides its friction: bounds, causes, and whole identifications."""
 
 import math
 from dataclasses import fields, replace

@@ -78,7 +78,7 @@ def test_the_view_for_plain_sql_is_the_same(history, server, postgres):
 
 
 def test_there_is_nothing_before_the_first_row(database):
-    with pytest.raises(HistoryError, match="holds no history: `valve_friction history copy`"):
+    with pytest.raises(HistoryError, match="contains no history: `valve_friction history copy`"):
         History(database).valves()
     with writing(database):
         pass
@@ -172,7 +172,7 @@ class TestTrouble:
         [
             (lambda url: url.replace("owner@", f"nobody:{SECRET}@"), "password"),
             (lambda url: re.sub(":[0-9]+/", ":1/", url), "check that the server runs"),
-            (lambda url: url + "x", "create it, or name another database"),
+            (lambda url: url + "x", "create it, or use another database"),
             (lambda url: url + "?sslmode=require", "check sslmode"),
             (lambda url: url + f"?nonsense=1&password={SECRET}", "cannot read"),
         ],

@@ -122,7 +122,7 @@ def test_no_folder_can_be_made(tmp_path):
     (tmp_path / "file").touch()
     history = HistoryFile(tmp_path / "file" / "history.sqlite")
     message = told(history)
-    assert message == "its folder is a file: check the folder, or name another history_file"
+    assert message == "its folder is a file: check the folder, or use another history_file"
     assert "there is no such file: check its name" in told(history, HistoryFile.entries)
 
 
@@ -163,7 +163,7 @@ def test_newer_schema(history):
     change(history, f"PRAGMA user_version = {tables.SCHEMA_VERSION + 1}")
     expected = (
         f"written by a newer version of this package (schema {tables.SCHEMA_VERSION + 1}, this "
-        f"version knows {tables.SCHEMA_VERSION}): update the package, or name another history_file"
+        f"version knows {tables.SCHEMA_VERSION}): update the package, or use another history_file"
     )
     for action in (HistoryFile.prepare, HistoryFile.entries):
         assert told(history, action) == expected
@@ -178,7 +178,7 @@ def test_another_programs_database(tmp_path, statement):
     history = HistoryFile(tmp_path / "theirs.sqlite")
     change(history, statement)
     before = history.path.read_bytes()
-    assert told(history) == "the database of another program: name another history_file"
+    assert told(history) == "the database of another program: use another history_file"
     assert history.path.read_bytes() == before
 
 
@@ -206,7 +206,7 @@ def test_no_database(tmp_path):
     history.path.write_bytes(b"nothing of the kind" * 100)
     for action in (HistoryFile.prepare, HistoryFile.entries):
         assert told(history, action) == (
-            "file is not a database: name the right file, or move this file away: the node then "
+            "file is not a database: give the right file, or move this file away: the node then "
             "begins a new file"
         )
     assert "unable to open" in told(HistoryFile(tmp_path))  # a folder
@@ -236,7 +236,7 @@ def test_held_by_another(history, monkeypatch):
     monkeypatch.setattr(database, "_PATIENCE", 0.05)
     holder = sqlite3.connect(history.path, isolation_level=None)
     holder.execute("BEGIN IMMEDIATE")
-    assert told(history) == "database is locked: find the process that holds it, and end it"
+    assert told(history) == "database is locked: find the process that locks it, and stop it"
     assert len(history.entries()) == 1  # reading is not held up
     history.prepare()  # nor is the start of a node
     holder.execute("ROLLBACK")

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Recordings of alarms over DDS: a bag and a page, bounded, named, also after a restart."""
+"""Alarm recordings over DDS: a bag and a page, bounded, named, also after a restart."""
 
 import subprocess
 import time

@@ -97,7 +97,8 @@ def sends_until_taken(client, made):
 
 def test_two_publishers_at_once(client):
     """Their samples are mixed, and if their stamps rise nothing else shows it."""
-    told = f"2 publishers send {STEM} at once, of {client.node.get_fully_qualified_name()}: end"
+    node = client.node.get_fully_qualified_name()
+    told = f"2 publishers send {STEM} at the same time, from {node}: stop"
     with publisher(client, JointState, STEM) as one, publisher(client, JointState, STEM) as other:
         turns = itertools.cycle((one, other))
 

@@ -363,7 +363,7 @@ def test_the_figures_outlive_a_kill(live, history):
     assert after["moves until [time]"] == "2023-11-14T22:14:50Z"
     client.identified(quick_record())
     page = Path(client.trigger("report").message).read_text(encoding="utf-8")
-    assert "Answer to the command" in page
+    assert "Response to the command" in page
     assert "latest 6 steps of stem_command, from 2023-11-14 22:13 to 2023-11-14 22:14" in page
     shown = command("history", history.path)
     assert "stem_command: 6 steps, 0 ignored; medians: dead time 1" in shown.stdout, shown.stderr

@@ -166,7 +166,7 @@ def test_a_dashboard_whose_port_is_in_use(ended):
         other.listen()
         code, errors = ended("dashboard", {"port": other.getsockname()[1]})
     assert code == 2
-    assert "give another port" in errors
+    assert "use another port" in errors
 
 
 def test_a_dashboard_without_nicegui_says_what_to_install(ended, tmp_path):
@@ -291,7 +291,7 @@ def test_arguments_that_ros_does_not_read_are_refused(given):
         "import sys; from valve_friction_ros.nodes import start; sys.argv[1:] = sys.argv[-2:]; "
         "assert start.identifier() == 2"
     )
-    told = f"cannot start: '{given}' is no argument of ROS: write --ros-args before "
+    told = f"cannot start: '{given}' is not a ROS argument: write --ros-args before "
     done = subprocess.run(
         [sys.executable, "-c", code, given, "travel:=0.03"],
         cwd=PROJECT, capture_output=True, text=True, timeout=100, check=True,

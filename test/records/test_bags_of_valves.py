@@ -101,7 +101,7 @@ def test_the_valves_of_a_bag(pressures, stems, choice, valves):
     ],
 )
 def test_several_are_named_and_not_guessed_among(pressures, stems, option):
-    with pytest.raises(ValueError, match=f": choose one by {option}$"):
+    with pytest.raises(ValueError, match=f": choose one with {option}$"):
         found(pressures, stems)
 
 

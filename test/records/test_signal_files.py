@@ -121,8 +121,9 @@ class TestWhatIsWhat:
         recording, notes = joined(paths)
         assert_true(recording)
         assert notes[0] == (
-            "read as: 2 files of a valve; semicolon; decimal comma; dates day first, UTC, as no "
-            "zone is stated; pressure 'Stelldruck [bar]' in bar, position 'Ventilstellung [%]' in %"
+            "read as: 2 files of a valve; semicolon; decimal comma; dates day first, UTC, because "
+            "no zone is stated; pressure 'Stelldruck [bar]' in bar, position 'Ventilstellung [%]' "
+            "in %"
         )
 
     def test_by_the_names_of_the_files_in_any_order(self, write):

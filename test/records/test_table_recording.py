@@ -209,7 +209,7 @@ class TestUnitsAndLayout:
         record = read_csv(path, form=form)
         np.testing.assert_array_equal(record.position, percent * BENCH_VALVE.travel / 100)
         assert refused(path, Valve(0.0445), form) == (
-            "a position in percent is a share of the travel: name the travel in the valve file"
+            "a position in percent is a share of the travel: give the travel in the valve file"
         )
 
     def test_range_of_the_sensor_in_another_unit(self, write):
@@ -438,8 +438,8 @@ class TestEntries:
             assert read_csv(path).pressure[10] == pressure
         else:
             assert refused(path) == (
-                f"row 12, column 'pressure_pa': {pressure:g} Pa is outside the sensor's range 0 "
-                "to 250000 Pa: use a stretch of the record without it, name its unit, or correct "
+                f"row 12, column 'pressure_pa': {pressure:g} Pa is outside the sensor's range 0 to "
+                "250000 Pa: use a stretch of the record without it, specify its unit, or correct "
                 "the range"
             )
 
@@ -514,10 +514,10 @@ class TestUnreadableFiles:
         [
             (b"\x89HDF\r\n\x1a\n\0\0", "as a table: an HDF5 file: save it as Parquet or CSV"),
             (b"ARROW1\0\0", "as a table: a Feather file: save it as Parquet or CSV"),
-            (b"TDSm\x0e\0\0\0", "as a table: a TDMS file of LabVIEW: export it as .lvm or CSV"),
+            (b"TDSm\x0e\0\0\0", "as a table: a LabVIEW TDMS file: export it as .lvm or CSV"),
             (b"\x80\x05\x95", "as CSV: a binary file: export it as CSV, .xlsx, Parquet or MAT"),
             (b"<?xml version='1.0'?>\n", "as CSV: a page in HTML or XML: save it from a spread"),
-            (b'[{"time":0,"value":1},\n', "as CSV: JSON: save it as CSV, a row for each time"),
+            (b'[{"time":0,"value":1},\n', "as CSV: JSON: save it as CSV, one row for each time"),
         ],
     )
     def test_other_files(self, tmp_path, start, told):
@@ -530,7 +530,7 @@ class TestUnreadableFiles:
     def test_archives_and_matrices(self, tmp_path):
         with zipfile.ZipFile(tmp_path / "a.zip", "w") as packed:
             packed.writestr("record.csv", HEADER)
-        assert "an archive, but no workbook of Excel" in refused(tmp_path / "a.zip")
+        assert "an archive, but not an Excel workbook" in refused(tmp_path / "a.zip")
         scipy.io.savemat(tmp_path / "a.mat", {"data": np.ones((9, 3)), "log": {"t": TIME}})
         assert refused(tmp_path / "a.mat").endswith("but data, log: save each signal as a vector")
 
@@ -550,7 +550,7 @@ class TestUnreadableFiles:
         assert len(read_csv(path)) == 40
         message = refused(path, form=Columns(encoding="utf-8"))
         assert message.startswith("cannot be read as CSV: 'utf-8' codec can't decode byte")
-        assert message.endswith("name its encoding (--encoding)")
+        assert message.endswith("specify its encoding (--encoding)")
 
     def test_no_table_at_all(self, tmp_path):
         path = tmp_path / "record.csv"
@@ -635,7 +635,7 @@ class TestAmbiguousFiles:
     def test_minutes(self, write):
         minutes = [f"{one / 400:.4f}" for one in range(40)]
         path = write(lines("Time,Air [bar],Stem [%]", minutes, BARS, SHARES))
-        assert "rises by 0.0975 in all (--time-unit s or --time-unit min)" in refused(path)
+        assert "rises by 0.0975 in total (--time-unit s or --time-unit min)" in refused(path)
         assert read_csv(path, form=Columns(time_unit="min")).sample_period == 0.15
 
     def test_more_entries_than_headers(self, write):
@@ -761,7 +761,7 @@ def test_range_and_travel_are_asked_for_together(write):
     path = write(lines("t [s],Air [mA],Stem [mA]", TENTHS, TENTHS, TENTHS))
     message = refused(path, Valve(0.0445))
     assert "(--pressure-range '0..2.5 bar'" in message
-    assert "name the travel in the valve file" in message
+    assert "give the travel in the valve file" in message
 
 
 def test_units_below_merged_cells(write):

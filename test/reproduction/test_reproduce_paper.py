@@ -112,7 +112,7 @@ def test_wrong_options_are_refused_in_one_line(tmp_path, monkeypatch, capsys, ar
 def test_an_output_that_is_a_file_is_refused(tmp_path, capsys):
     (tmp_path / "taken").write_text("")
     assert run(["reproduce-paper", "--output", str(tmp_path / "taken")]) == 2
-    told = f"{tmp_path / 'taken'}: is no folder: give --output another name"
+    told = f"{tmp_path / 'taken'}: not a folder: give --output another name"
     assert capsys.readouterr().err == f"valve_friction reproduce-paper: {told}\n"
 
 

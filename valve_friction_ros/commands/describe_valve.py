@@ -78,7 +78,7 @@ def run(options: argparse.Namespace) -> int:
     """Ask the questions and write the file."""
     output: Path | None = options.output
     if output is not None and output.exists() and not options.replace:
-        raise ValueError(f"{output}: it exists already: give another name, or --replace")
+        raise ValueError(f"{output}: it already exists: give another name, or --replace")
     answers = _answers(options)
     if answers["opposing_area"] is not None and answers["acting"] != "double":
         raise ValueError(

@@ -111,7 +111,7 @@ def _answers(response: ResponseSummary) -> str:
 def _words(usage: Usage) -> str:
     return (
         f"{usage.distance:.5g} m of travel, {usage.reversals} reversals, {usage.breakaways} "
-        f"breakaways in {usage.time_watched / _HOUR:.4g} h watched"
+        f"breakaways in {usage.time_watched / _HOUR:.4g} h monitored"
     )
 
 
@@ -122,7 +122,7 @@ def _print_usage_table(
     console = plain_console()
     for valve, usage in valves:
         counts = ("travel [m]", "reversals", "breakaways")
-        hours = ("watched [h]", "near 0 % [h]", "near 100 % [h]")
+        hours = ("monitored [h]", "near 0 % [h]", "near 100 % [h]")
         table = _valve_table(valve, "day [UTC]", *counts, *hours, "packing of")
         for column in table.columns[1:-1]:
             column.justify = "right"
@@ -147,7 +147,7 @@ def _print_usage_table(
         if (pace := usage.pace()) is not None:
             console.print(
                 f"recent pace: {pace.distance:.4g} m and {pace.reversals:.4g} reversals per day "
-                "watched"
+                "monitored"
             )
         console.print()
 
@@ -344,7 +344,7 @@ def _trend_lines(trend: Trend | None) -> list[str]:
 def _print_usages(options: argparse.Namespace) -> int:
     """Print the usage of the chosen valves, and write the requested table."""
     if options.plot is not None or options.fail_on is not None:
-        raise ValueError("--usage: neither --plot nor --fail-on belong to it")
+        raise ValueError("--usage: cannot be combined with --plot or --fail-on")
     file, usages = History(options.file), []
     since, until = _span(options)
     for valve in chosen_valves(file.valves(), options.valve, "--valve"):
@@ -392,7 +392,7 @@ def run(options: argparse.Namespace) -> int:
         try:
             figure = figures.trend_figure(histories, time.time_ns())
         except ValueError as error:
-            raise ValueError(f"--plot: {error} by --valve") from None
+            raise ValueError(f"--plot: {error} with --valve") from None
     try:
         if options.json:
             print(json.dumps(_as_json(histories), ensure_ascii=False, allow_nan=False))

@@ -378,7 +378,7 @@ def _baselines(options: argparse.Namespace, names: Sequence[str]) -> Baselines:
     if count == 0:
         raise ValueError(
             f"{options.baselines}: no recording of {options.folder} has a baseline in it: its "
-            f"column recording must hold names such as {names[0]}"
+            f"column recording must contain names such as {names[0]}"
         )
     print(f"baselines: {count} of {len(names)} recordings have one", file=sys.stderr)
     return baselines
@@ -395,7 +395,7 @@ def _planned(options: argparse.Namespace) -> dict[str, Plan]:
         shown = ", ".join(findings.skipped[:_SHOWN_SKIPPED])
         more = len(findings.skipped) - _SHOWN_SKIPPED
         rest = f" and {more} more" if more > 0 else ""
-        print(f"skipped, no recordings: {shown}{rest}", file=sys.stderr)
+        print(f"skipped, not recordings: {shown}{rest}", file=sys.stderr)
     if not findings.recordings:
         raise ValueError(f"{options.folder}: contains no tables (CSV, xlsx, Parquet) and no bags")
     plant = {} if options.plant is None else read_plant(options.plant)

@@ -36,7 +36,7 @@ from valve_friction_ros.identification.refusal import RefusalError
 
 SUB_COMMANDS = {
     "identify": "identify the friction of a valve from a CSV file or a bag",
-    "inspect": "show what would be read of a table: columns, units, rates, gaps, quality",
+    "inspect": "show what would be read from a table: columns, units, rates, gaps, quality",
     "identify-folder": "identify all recordings of a folder, on all cores",
     "describe-valve": "ask for an actuator's data and write its valve file",
     "plan-test": "plan the stroke test that determines friction best, as a file to play",
@@ -45,8 +45,8 @@ SUB_COMMANDS = {
     "history": "list, export and draw what the nodes have identified",
     "history copy": "copy a history to another file, or to or from a server",
     "dashboard": "serve plant, valves, alarms and comparison of a history, without ROS",
-    "dashboard-account": "make an account of the dashboard, with the hash of a password",
-    "reproduce-paper": "run the paper's programme and write a report",
+    "dashboard-account": "make a dashboard account, with the hash of a password",
+    "reproduce-paper": "run the paper's experiments and write a report",
     "demo": "tighten the packing of a monitored simulated valve",
 }
 """Line in ``--help`` of each sub-command. ``identify-folder`` is `run` of the module

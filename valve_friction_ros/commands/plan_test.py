@@ -168,26 +168,27 @@ def print_plan(plan: StrokePlan, path: Path) -> None:
     table.add_row("top speed [mm/s]", *(f"{one.top_speed * 1e3:.2g}" for one in plan.forecasts))
     console.print(table)
     console.print(
-        "On simulated valves of other physics the reported intervals were 1.5 to 1.8 times as "
-        "wide (median), and that of F_c up to 16 times where friction varies along the "
-        "travel or gradually with speed."
+        "On simulated valves with other physics the reported intervals were 1.5 to 1.8 times as "
+        "wide (median), and that of F_c up to 16 times where friction varies along the travel or "
+        "gradually with speed."
     )
     for remark in plan_remarks(plan):
         console.print(f"note: {remark}")
     low, high = plan.limits.lowest, plan.limits.highest
     lowest, highest = stem_limits(plan)
     console.print(
-        "Nothing has been moved. Before: agree with operations, put the loop in manual, keep "
-        f"people off the stem, and bring the pressure slowly to {test.pressures[0] / 1e3:.4g} kPa. "
-        f"Meanwhile: watch that the stem stays between {100 * lowest:.0f} and {100 * highest:.0f} "
-        f"% of the travel ({100 * low:g} to {100 * high:g} % with the friction assumed). If it "
-        "does not, or the process moves too far, abort: stroke_player returns to the initial "
-        "pressure; after stopping pressure_source, restore it by hand. After: identify the record "
-        "before the loop goes back to automatic."
+        "Nothing has been moved. Before the test: agree it with operations, put the loop in "
+        "manual, keep people away from the stem, and bring the pressure slowly to "
+        f"{test.pressures[0] / 1e3:.4g} kPa. "
+        f"During the test: watch that the stem stays between {100 * lowest:.0f} and "
+        f"{100 * highest:.0f} % of the travel ({100 * low:g} to {100 * high:g} % with the friction "
+        "assumed). If it does not, or the process moves too far, abort: stroke_player returns to "
+        "the initial pressure; after stopping pressure_source, restore it by hand. After "
+        "the test: identify the record before the loop goes back to automatic."
     )
     console.print(
         "Without ROS: --table writes the set points in %, mA and pressure for a control system, "
-        "and --form a sheet for a person, with the limits at which to abort."
+        "and --form a test sheet for an operator, with the limits at which to abort."
     )
     console.print(
         "On a real valve, use the command topic of your converter, never the topic of the "
@@ -259,7 +260,7 @@ def run(options: argparse.Namespace) -> int:
     files: list[Path] = [*filter(None, (options.output, options.table, options.form))]
     for path in files:
         if path.exists() and not options.replace:
-            raise ValueError(f"{path}: it exists already: give another name, or --replace")
+            raise ValueError(f"{path}: it already exists: give another name, or --replace")
     require_outputs(*files, picture=options.figure)
     described = read_valve_file(options.valve, options.valve_name)
     plan = _planned(options, described)

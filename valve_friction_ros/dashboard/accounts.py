@@ -100,7 +100,8 @@ class HashedPassword:
         """
         if not SHORTEST <= len(password) <= LONGEST:
             raise ValueError(
-                f"a password has {SHORTEST} to {LONGEST} characters, this one {len(password)}"
+                f"a password must have {SHORTEST} to {LONGEST} characters, but this one has "
+                f"{len(password)}"
             )
         salt = secrets.token_bytes(_SALT)
         empty = cls(_COST, _BLOCK, _PARALLEL, salt, bytes(_DIGEST))
@@ -189,7 +190,7 @@ class Account:
     def __post_init__(self) -> None:
         """Refuse an invalid name."""
         if not _NAME.fullmatch(self.name):
-            raise ValueError("the name of an account has 1 to 64 letters, digits or _.@+-")
+            raise ValueError("an account name must have 1 to 64 letters, digits or _.@+-")
 
     @classmethod
     def read(cls, line: str) -> "Account":
@@ -218,7 +219,7 @@ def _read(text: str, source: str) -> tuple[Account, ...]:
         found[account.name] = account
     if not found:
         raise ValueError(
-            f"{source} holds no account: add one with `valve_friction dashboard-account`"
+            f"{source} contains no account: add one with `valve_friction dashboard-account`"
         )
     return tuple(found.values())
 
@@ -288,7 +289,7 @@ class Access:
         """Refuse options that would let anybody in."""
         if not self.accounts and (not is_loopback(self.host) or self.host_names):
             raise ValueError(
-                f"host {self.host!r} is open to other machines, but there are no accounts: make "
+                f"host {self.host!r} is open to other machines, but there are no accounts: create "
                 "one with `valve_friction dashboard-account NAME >> FILE; chmod 600 FILE` and set "
                 f"accounts_file (or put its lines into {VARIABLE}), or use 127.0.0.1"
             )
@@ -310,7 +311,7 @@ class Access:
         """Warning for the operator; empty if there is none."""
         if self.accounts and not self.is_encrypted and not is_loopback(self.host):
             return (
-                "no certificate: passwords and sessions can be read on the way; give "
+                "no certificate: passwords and sessions can be read in transit; give "
                 "certificate_file and key_file"
             )
         return ""

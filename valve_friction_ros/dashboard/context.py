@@ -142,8 +142,8 @@ class Signals(Protocol):
         ...
 
 
-_NOT_ALLOWED = Answer(False, "your account may not operate: log in with one that may")
-_NOTHING_HEARD = "this dashboard shows only a history: there is no identifier to ask"
+_NOT_ALLOWED = Answer(False, "your account may only view: log in with one that may operate")
+_NOTHING_HEARD = "this dashboard shows only a history: there is no identifier to call"
 _ALARM_SERVICES = {
     AlarmAction.ACKNOWLEDGE: ("acknowledge", None),
     AlarmAction.SHELVE: ("shelve", None),

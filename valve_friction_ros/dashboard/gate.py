@@ -138,7 +138,7 @@ class _Bounded(HttpToolsProtocol):
     def end(self, why: str) -> None:
         """End the connection at once, and log the reason."""
         self._has_arrived()
-        self._log(f"a connection of {printable(self._network)} was ended: {why}")
+        self._log(f"a connection of {printable(self._network)} was closed: {why}")
         self.connections.discard(self)
         self.transport.abort()
 
@@ -238,7 +238,7 @@ class Gate:
             return PlainTextResponse(words, 400, OF_LOG_IN)
         origin = asked.headers.get("origin")
         if not is_own_origin(origin, host, self._access.is_encrypted):
-            return PlainTextResponse("refused: asked by another site", 403, OF_LOG_IN)
+            return PlainTextResponse("refused: requested by another site", 403, OF_LOG_IN)
         return None
 
     async def _without_session(self, asked: HTTPConnection, receive: Receive) -> Response | None:
@@ -265,7 +265,7 @@ class Gate:
         try:
             fields = await asyncio.wait_for(_fields(request), _PATIENCE)
         except (asyncio.TimeoutError, ValueError):  # equals the builtin one only since Python 3.11
-            return PlainTextResponse("no form of a log-in", 400, OF_LOG_IN)
+            return PlainTextResponse("not a log-in form", 400, OF_LOG_IN)
         there = own_path(fields.get("next", "/"))
         address = request.client.host if request.client else ""
         name = fields.get("name", "")

@@ -317,7 +317,7 @@ class KeptValves(HistoryCache):
         self._read: HistoryMark | None = None
         self._statuses: dict[KeptValve, list[Status]] = {}
         self._ends: dict[KeptValve, int] = {}
-        """Earliest end of shelving or absence of each valve, ns."""
+        """Earliest end of shelving or time out of service of each valve, ns."""
 
     def _refresh(self) -> bool:
         self._end_suppressions()

@@ -154,8 +154,8 @@ class Sessions:
             self._keep()
         except OSError as error:
             self._log(
-                f"the sessions cannot be kept in {self._file} ({error.strerror or error}): they go "
-                "on until the dashboard ends; free space, or name another session_file"
+                f"the sessions cannot be kept in {self._file} ({error.strerror or error}): they "
+                "last until the dashboard ends; free space, or name another session_file"
             )
 
     def _keep(self) -> None:

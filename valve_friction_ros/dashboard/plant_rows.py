@@ -240,7 +240,7 @@ def summary(counts: Mapping[str, int]) -> str:
     """Return the number of valves, and the number in each state other than good."""
     total = sum(counts.values())
     if not total:
-        return "No valve yet"
+        return "No valves yet"
     others = [f"{n} {STATE_WORDS[state]}" for state, n in counts.items() if n and state != "ok"]
     valves = numbered(total, "valve")
     return f"{valves}: {', '.join(others)}" if others else f"{valves}, all good"

@@ -230,7 +230,7 @@ def scales_of(moves: Moves, levels: NDArray[np.intp]) -> Scales:
 
 
 def _is_steady(levels: NDArray[np.intp]) -> NDArray[np.bool_]:
-    """Return whether the process force surely did not step during a move."""
+    """Return whether the process force clearly did not step during a move."""
     steps = np.diff(levels) != 0
     return np.asarray(~(np.append(False, steps) | np.append(steps, False)), dtype=np.bool_)
 

@@ -294,7 +294,7 @@ def trend_figure(histories: Sequence[ValveHistory], now: int | None = None) -> F
     """
     if not 0 < len(histories) <= MOST_PANELS:
         raise ValueError(
-            f"one to {MOST_PANELS} valves can be drawn, got {len(histories)}: choose some"
+            f"one to {MOST_PANELS} valves can be plotted, got {len(histories)}: choose some"
         )
     span = span_of_time(histories, now)
     heights = []
@@ -354,11 +354,11 @@ def usage_figure(usage: ValveUsage, is_narrow: bool = False) -> Figure:
     """Draw the time at each 5 % of travel, and the distance travelled on each of the last 31 days.
 
     Both cover the present packing only. A narrow page shows them one below the other. Raises
-    ValueError if the valve was not watched.
+    ValueError if the valve was not monitored.
     """
     used = usage.since_renewal
     if not used.time_watched:
-        raise ValueError("the valve was not watched: there is nothing to draw")
+        raise ValueError("the valve was not monitored: there is nothing to plot")
     figure = Figure(figsize=(3.7, 4.8) if is_narrow else (7.1, 2.6), layout="constrained")
     places, days = figure.subplots(2, 1) if is_narrow else figure.subplots(1, 2)
     width = 100 / BINS

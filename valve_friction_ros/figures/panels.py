@@ -150,9 +150,11 @@ def require_picture_file(path: Path) -> None:
     """
     endings = Figure().canvas.get_supported_filetypes()
     if _format(path) not in endings:
-        raise ValueError(f"{path}: the ending is not a picture format; choose .png, .pdf or .svg")
+        raise ValueError(
+            f"{path}: the extension is not a picture format; choose .png, .pdf or .svg"
+        )
     if not path.parent.is_dir():
-        raise ValueError(f"{path}: there is no folder {path.parent}: create it, or name another")
+        raise ValueError(f"{path}: there is no folder {path.parent}: create it, or choose another")
 
 
 def save_picture(figure: Figure, path: Path) -> None:

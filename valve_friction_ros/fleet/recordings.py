@@ -401,7 +401,9 @@ def valves_of(
         if len(found) == 1:
             return [("", found[0], plant[found[0]])]
         if found:
-            raise ValueError(f"it names several valves ({', '.join(found)}): put one into its name")
+            raise ValueError(
+                f"it names several valves ({', '.join(found)}): put a single tag into its name"
+            )
     raise ValueError("no tag of the plant is in its name or above its values: rename it")
 
 
@@ -501,5 +503,5 @@ def read_baselines(path: Path) -> Baselines:
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise ValueError(f"{path}: cannot be read: {cause_of(error)}") from None
     if not found:
-        raise ValueError(f"{path}: no friction in it is known well enough to be a baseline")
+        raise ValueError(f"{path}: no friction in it is known well enough for a baseline")
     return Baselines(MappingProxyType(found))

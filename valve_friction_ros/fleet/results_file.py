@@ -81,7 +81,7 @@ class ResultsFile(contextlib.AbstractContextManager["ResultsFile"]):
             if output.is_file() and not self._database.exists():
                 raise ValueError(
                     f"{output}: it exists, but {self._database.name}, which holds its rows, does "
-                    "not: give another output, or move the file away"
+                    "not: use another output, or move the file away"
                 )
         with self._explained():
             self._connection = sqlite3.connect(self._database, timeout=0)
@@ -104,7 +104,7 @@ class ResultsFile(contextlib.AbstractContextManager["ResultsFile"]):
         self._connection.commit()
         found = [row[1] for row in self._connection.execute("PRAGMA table_info(result)")]
         if set(found) - set(_KEPT):
-            raise ValueError(f"{self._database}: results of another version: give another output")
+            raise ValueError(f"{self._database}: results of another version: use another output")
         for name in _KEPT:
             if name not in found:  # a column that an earlier version did not have
                 self._connection.execute(f"ALTER TABLE result ADD COLUMN {name}")

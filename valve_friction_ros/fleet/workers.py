@@ -284,7 +284,9 @@ class Cluster:
 
     def gone(self) -> str:
         """Return the message that the scheduler has gone."""
-        return f"{self.address}: the scheduler is gone: once it is back, run the command again"
+        return (
+            f"{self.address}: the scheduler has disappeared: once it is back, run the command again"
+        )
 
     def differs(self, cause: str) -> str:
         """Return the message that a worker cannot do the work."""

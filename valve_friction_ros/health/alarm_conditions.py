@@ -39,7 +39,7 @@ unchanged valve then raises at most one alarm per year, even half an interval fr
 _TAIL = 0.025
 """Probability that a number lies above its 95 % interval."""
 _SURELY = 1.5
-"""Half widths from which friction has surely changed, as in `friction_state`."""
+"""Half widths from which friction has clearly changed, as in `friction_state`."""
 _NORMAL = NormalDist()
 _QUANTILE = _NORMAL.inv_cdf(1 - _TAIL)
 
@@ -160,7 +160,7 @@ class FrictionHold:
 def farthest(now: Mapping[str, Measured], healthy: Mapping[str, Measured]) -> dict[str, Measured]:
     """Return each number of a valve at the end of its interval that is farthest from healthy.
 
-    A change that these do not show is surely absent, and the alarm on the whole valve ends.
+    A change that these do not show is clearly absent, and the alarm on the whole valve ends.
     """
     found = dict(now)
     for name in now.keys() & healthy.keys():

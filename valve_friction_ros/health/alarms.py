@@ -189,7 +189,7 @@ class Alarm:
     raised : int or None
         When it was last raised, ns since 1970 (UTC); None if never.
     until : int or None
-        End of shelving or absence, ns; None in the other states.
+        End of shelving or of the time out of service, ns; None in the other states.
     message : str
         The message of the condition when it was raised or last changed level.
 
@@ -272,7 +272,7 @@ class AlarmRequest:
     text : str
         Their comment; required by the action to comment.
     duration : float
-        Length of shelving or absence, s; unused by the other actions.
+        Duration of shelving or of the time out of service, s; unused by the other actions.
 
     Raises
     ------

@@ -244,9 +244,9 @@ def compared(
 
     The sliding friction is carried to the speed of the baseline (`carried`). F_c is compared where
     that is not possible. Where both are comparable, F_c qualifies only if it is identified and has
-    not surely changed by more newtons than the sliding friction: an exchange between F_c and F_v
-    is no change of friction. The friction that has surely changed further then decides. If neither
-    has surely changed, the better known decides. A lag between the signals changes the sliding
+    not clearly changed by more newtons than the sliding friction: an exchange between F_c and F_v
+    is not a change of friction. The friction that has clearly changed more decides. If neither
+    has clearly changed, the better known decides. A lag between the signals changes the sliding
     friction but not F_c, and the viscous part hides growth of F_c.
 
     Both sides leave out the uncertainties of area and sensor scales: the same area and sensors
@@ -254,7 +254,7 @@ def compared(
     baseline again.
 
     Sliding frictions at speeds too far apart (`carried`) are compared only where their ratio
-    surely differs from 1: the interval includes all that the speeds may explain.
+    clearly differs from 1: the interval includes all that the speeds may explain.
 
     Parameters
     ----------
@@ -310,7 +310,7 @@ def _shared(
 
 
 def _exchanged(coulomb: Comparison, sliding: Comparison) -> bool:
-    """Return whether F_c surely moved by more newtons than the sliding friction."""
+    """Return whether F_c clearly moved by more newtons than the sliding friction."""
     change, width = coulomb.excess
     limit, doubt = sliding.excess
     way = math.copysign(1.0, change)

@@ -114,7 +114,7 @@ class FrictionState(Enum):
     UNCLEAR = auto()
     """Beyond a limit, but possibly unchanged."""
     GROWN = auto()
-    """Surely changed, and most probably beyond the warning bound."""
+    """Clearly changed, and most probably beyond the warning bound."""
     EXCESS = auto()
     FALLEN = auto()
     COLLAPSED = auto()
@@ -126,7 +126,7 @@ class FrictionState(Enum):
 
     @property
     def side(self) -> Side | None:
-        """The side to which the friction has surely moved; None if that is not sure."""
+        """The side to which the friction has clearly moved; None if that is not sure."""
         return _MEANINGS[self][2]
 
     @property
@@ -246,7 +246,7 @@ class Diagnosis:
     def possible(self, side: Side, limits: FrictionLimits) -> Level:
         """Return the highest level on a side that the interval of the ratio allows.
 
-        Without a ratio every level stays possible, unless friction has surely moved to the other
+        Without a ratio every level stays possible, unless friction has clearly moved to the other
         side.
         """
         if self.ratio is None:
@@ -258,7 +258,7 @@ class Diagnosis:
         return Level(2 - sum(is_below))
 
     def of_before(self, time: int | None) -> "Diagnosis":
-        """Return the diagnosis of a valve that is not watched now, from its record at `time`, ns.
+        """Return the diagnosis of a valve that is not monitored now, from its record at `time`, ns.
 
         It reports normal friction in the past tense: it may have changed since.
         """
@@ -440,7 +440,7 @@ def diagnose(
         Its state follows `friction_state`: an uncertain result raises no alarm.
         A friction that is not identifiable has collapsed where even its largest possible value
         lies below the low bound. A model that does not describe the valve is reported without an
-        alarm: a single record is no sign of a fault.
+        alarm: a single record is not a sign of a fault.
     """
     limits = limits or FrictionLimits()
     for friction in _frictions(result):
@@ -526,8 +526,8 @@ def _vanished(
 ) -> Statement | None:
     """Return a statement if a friction too small to identify lies below the low limit, else None.
 
-    F_c decides only where no sliding friction contradicts it: what F_c loses to F_v is no collapse.
-    At a higher speed a sliding friction is larger, at most by the ratio of the speeds.
+    F_c decides only where no sliding friction contradicts it: a shift from F_c to F_v is not a
+    collapse. At a higher speed sliding friction is larger, at most by the ratio of the speeds.
     """
     healthy = {"coulomb_friction": (baseline.coulomb_friction or 0.0, baseline.half_width)}
     if (slid := baseline.sliding) is not None:
@@ -580,7 +580,7 @@ def friction_state(ratio: Ratio, limits: FrictionLimits) -> FrictionState:
 
     Friction is excessive, or has collapsed, where the whole interval lies beyond the bound. It has
     grown or fallen where the whole interval lies beyond the warning bound, or where the ratio does
-    and friction has surely changed (`_SURELY`). Where the change may be chance, the state is
+    and friction has clearly changed (`_SURELY`). Where the change may be chance, the state is
     unclear.
     """
     surely = math.isnan(ratio.low) or (

@@ -68,8 +68,8 @@ def followed(
 ) -> StandingAlarm | None:
     """Return what remains of an alarm after the next record, whose own diagnosis is `latest`.
 
-    It is the same alarm if that record leaves its level possible; a WARN if it surely clears the
-    ERROR but not the WARN; None if it surely clears both, or raises as severe an alarm itself.
+    It is the same alarm if that record leaves its level possible; a WARN if it clearly clears the
+    ERROR but not the WARN; None if it clearly clears both, or raises as severe an alarm itself.
     """
     side = alarm.state.side
     if side is None:
@@ -262,7 +262,7 @@ class FrictionMonitor:
     stamp : int or None
         Time of the latest result or of the earlier estimate, ns.
     known : KnownNumbers
-        Numbers of the valve beside its friction, including those of earlier records.
+        Numbers of the valve besides its friction, including those of earlier records.
     refusal : str or None
         Why the latest identification was refused; None if it was not.
     internal_error : str or None
@@ -317,7 +317,7 @@ class FrictionMonitor:
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """Changes of the valve beside its friction (`KnownNumbers.findings`)."""
+        """Changes of the valve besides its friction (`KnownNumbers.findings`)."""
         settings = self.settings
         return self.known.findings(self.baseline, settings.valve, settings.valve_limits)
 
@@ -330,7 +330,7 @@ class FrictionMonitor:
         return held_finding(self.known.of_latest, baseline, settings.valve, settings.limits)
 
     def may_have_changed(self) -> bool:
-        """Return whether something beside friction may have changed (`KnownNumbers.may_differ`)."""
+        """Return whether more than friction may have changed (`KnownNumbers.may_differ`)."""
         baseline, settings = self.baseline, self.settings
         if baseline is None or not baseline.numbers:
             return False
@@ -424,7 +424,7 @@ class FrictionMonitor:
     def skip(self, refusal: RefusalError) -> None:
         """Count a refusal without changing the diagnosis.
 
-        A record with too little motion is no fault, nor does it clear one.
+        A record with too little motion is not a fault, nor does it clear one.
         """
         if isinstance(refusal, RefusedRecordError) and refusal.is_fault:
             self._refused, self._refused_last = self._refused + 1, str(refusal)
@@ -462,7 +462,7 @@ class FrictionMonitor:
         """Return the diagnosis by the latest result, also after a refusal; OK without a result.
 
         The diagnosis of an earlier estimate states its age at `now`, ns, if given. For a valve that
-        is not watched, because its samples cannot be used, a normal state is in the past tense.
+        is not monitored, because its samples cannot be used, a normal state is in the past tense.
         A bug in an identification raises the level to ERROR until an identification succeeds.
         """
         diagnosis = self._diagnosis_by_result(now, is_watched)

@@ -237,7 +237,7 @@ def held_finding(
 def _surely_held(
     swing: Measured, middle: Measured | None, place: Measured, baseline: Baseline, valve: Valve
 ) -> float:
-    """Return the largest static friction that surely held the stem in a test, N, or 0.
+    """Return the largest static friction that clearly held the stem in a test, N, or 0.
 
     It is half of the swing of the force. At an end of its range, as in a partial stroke, the stem
     may have been pressed on a stop. The force beyond k·x + F_0 on that side is then ignored.
@@ -288,7 +288,7 @@ def standstill_finding(
 
 
 def _room(position: float, baseline: Baseline, valve: Valve) -> tuple[bool, bool]:
-    """Return whether a stem can surely move up from a position, and down.
+    """Return whether a stem can clearly move up from a position, and down.
 
     It can within the range of motion of the baseline: no stop lies there.
     """

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Changes of a valve beside its friction: limits, what to check, and the newest measurements."""
+"""Changes of a valve besides its friction: limits, what to check, and the newest measurements."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -35,7 +35,7 @@ from valve_friction_ros.wording import Code, Statement, said
 
 @dataclass(frozen=True)
 class ValveLimits:
-    """Bounds of the changes of a valve beside its friction (`FrictionLimits`).
+    """Bounds of the changes of a valve besides its friction (`FrictionLimits`).
 
     A bound is exceeded only when the whole interval of the change lies beyond it.
 
@@ -144,8 +144,8 @@ def diagnose_numbers(
     Returns
     -------
     tuple of Finding
-        A finding for each change that is surely beyond its bound, with what to check. A number that
-        either side lacks is not compared. A finding names all causes that a record cannot tell
+        A finding for each change clearly beyond its bound, with what to check. A number that either
+        side lacks is not compared. A finding names all causes that a record cannot tell
         apart, except those that another number excludes.
     """
     case = _Case(
@@ -257,7 +257,7 @@ def _is_scale_excluded(case: _Case, spring: Measured) -> bool:
 
 
 def _preload_ratio(case: _Case) -> Measured | None:
-    """Return the ratio of the preloads, where both are surely above zero."""
+    """Return the ratio of the preloads, where both are clearly above zero."""
     now, healthy = (side.get("spring_preload") for side in (case.now, case.healthy))
     if now is None or healthy is None:
         return None
@@ -352,7 +352,7 @@ _SIDES = {
 
 
 def _stops(case: _Case) -> Iterator[Finding]:
-    """Find stops that have surely moved by more than their share of the travel.
+    """Find stops that have clearly moved by more than their share of the travel.
 
     A stop that only the present record met is compared with the range of motion of the baseline: if
     the baseline went farther, travel is lost. A baseline stop that the stem has now passed has
@@ -376,7 +376,7 @@ def _stops(case: _Case) -> Iterator[Finding]:
 
 
 def _moved(case: _Case) -> dict[str, Measured]:
-    """Return the changes of the stops that have surely moved by more than their bound, m."""
+    """Return the changes of the stops that have clearly moved by more than their bound, m."""
     bound = case.limits.stop_change * case.valve.travel
     moved = {}
     for name, (end, side) in _SIDES.items():
@@ -425,7 +425,7 @@ def drive_scale(valve: Valve) -> Statement:
 
 
 def _spring_change(changes: Mapping[str, Measured], limits: ValveLimits) -> Measured | None:
-    """Return the ratio of the spring constants where it is surely beyond its bound."""
+    """Return the ratio of the spring constants where it is clearly beyond its bound."""
     change, share = changes.get("spring_constant"), limits.spring_change
     return change if change is not None and change.beyond(1 - share, 1 + share) else None
 
@@ -433,7 +433,7 @@ def _spring_change(changes: Mapping[str, Measured], limits: ValveLimits) -> Meas
 def common_factor(changes: Mapping[str, Measured], limits: ValveLimits) -> Measured | None:
     """Return the common factor of change of all forces, as if the scale of the drive changed.
 
-    Return None if the spring constant has not surely changed, or the frictions not by its factor.
+    Return None if the spring constant has not clearly changed, or the frictions not by its factor.
     """
     spring, coulomb = _spring_change(changes, limits), changes.get("coulomb_friction")
     if spring is None or coulomb is None or coulomb.holds(1.0) or not _is_narrow(coulomb):
@@ -512,7 +512,7 @@ class KnownNumbers:
     def followed_by(self, numbers: Mapping[str, Measured], time: int) -> "KnownNumbers":
         """Return the numbers after a further record.
 
-        A stop is dropped once the stem has surely gone beyond it. The farthest position stays until
+        A stop is dropped once the stem has clearly passed it. The farthest position stays until
         a record shows a stop, or a position at least as far.
         """
         dated = dict(self.dated)

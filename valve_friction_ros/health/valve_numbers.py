@@ -387,7 +387,7 @@ class RefusedRecordError(RefusalError):
 
     @classmethod
     def of(cls, refusal: RefusalError, numbers: Mapping[str, Measured]) -> "RefusedRecordError":
-        """Return a refusal with numbers; too little motion is no fault of the record."""
+        """Return a refusal with numbers; too little motion is not a fault of the record."""
         return cls(str(refusal), numbers, not isinstance(refusal, LittleMotionError))
 
     def __reduce__(self) -> tuple[object, ...]:

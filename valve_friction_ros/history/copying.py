@@ -245,7 +245,7 @@ def copied(
         If a history cannot be read, or the target cannot be written.
     """
     if source == target:
-        raise HistoryError(f"{target}: is both ends of the copy: name another one")
+        raise HistoryError(f"{target}: is both source and target of the copy: give another one")
     with _source(source) as place, reading(place) as old:
         wanted = sorted(
             (KeptValve(row.name, row.tag), row.id)

@@ -57,7 +57,7 @@ _OF_SERVER = {
 
 _INSTALL = "pip install 'SQLAlchemy>=2.0,<3' 'psycopg[binary]>=3.2,<4'"
 
-_ANOTHER = "or name another history_file"
+_ANOTHER = "or use another history_file"
 _OWNER = "have the owner of the database run `valve_friction history copy` once"
 _TLS = "check sslmode and sslrootcert of the address"
 _AWAY = "check that the server runs, and that this machine reaches it"
@@ -66,10 +66,10 @@ _REMEDIES_OF_FILE = (
     ("readonly", f"make the file and its folder writable, {_ANOTHER}"),
     ("unable to open", f"check that the folder exists and is writable, {_ANOTHER}"),
     ("disk I/O error", "check the disk, its free space and the process's limits"),
-    ("locked", "find the process that holds it, and end it"),
+    ("locked", "find the process that locks it, and stop it"),
     (
         "not a database",
-        "name the right file, or move this file away: the node then begins a new file",
+        "give the right file, or move this file away: the node then begins a new file",
     ),
     (
         "malformed",
@@ -81,8 +81,8 @@ _REMEDIES_OF_SERVER = (
     ("permission denied for schema", _OWNER),
     ("must be owner", _OWNER),
     ("permission denied", "give this role the rights that doc/how_to/history_server.md lists"),
-    ("read-only transaction", "name the server that accepts writes, or set target_session_attrs"),
-    ("does not exist", "create it, or name another database or role"),
+    ("read-only transaction", "give the server that accepts writes, or set target_session_attrs"),
+    ("does not exist", "create it, or use another database or role"),
     ("No space left", "make room on the disk of the server"),
     ("no encryption", _TLS),
     ("SSL", _TLS),
@@ -161,9 +161,7 @@ def _version_of_file(path: Path, connection: Connection) -> int:
     if application != _APPLICATION:
         tables = connection.exec_driver_sql("SELECT count(*) FROM sqlite_master").scalar()
         if application or version or tables:
-            raise HistoryError(
-                f"{path}: the database of another program: name another history_file"
-            )
+            raise HistoryError(f"{path}: the database of another program: use another history_file")
         return 0
     if version > SCHEMA_VERSION:
         raise HistoryError(
@@ -370,7 +368,7 @@ def _reading_server(server: HistoryServer) -> Iterator[tuple[Connection, int]]:
         connection.execution_options(isolation_level="REPEATABLE READ")
         if not (version := _version_on_server(connection, server)):
             raise HistoryError(
-                f"{server}: holds no history: `valve_friction history copy` creates its tables"
+                f"{server}: contains no history: `valve_friction history copy` creates its tables"
             )
         yield connection, version
 

@@ -525,7 +525,7 @@ def _state(name: str) -> FrictionState:
     try:
         return _FORMER_STATES.get(name) or FrictionState[name]
     except KeyError:
-        raise ValueError(f"{name!r} is no state of a friction") from None
+        raise ValueError(f"{name!r} is not a friction state") from None
 
 
 # Rows before version 9 hold statements only as sentences. Rows before version 8 also hold the state

@@ -72,7 +72,7 @@ def _rows_of(file: HistoryFile, valve: KeptValve) -> Iterator[_Rows]:
         yield _Rows(connection, valve_id(connection, valve))
 
 
-# Recordings of alarms, and the level that was notified last
+# Alarm recordings, and the level that was notified last
 
 
 def keep_alarm_recording(

@@ -45,7 +45,7 @@ _NORMAL = 1.959964
 _HORIZON = 2.0
 """Largest distance of a crossing after the last point, in spans of the points.
 
-Chosen: the line is no evidence beyond it."""
+Chosen: the line is not evidence beyond it."""
 
 _OUTLIER = 0.001
 """Probability of finding an outlier in a history without outliers. Chosen."""

@@ -145,9 +145,9 @@ def friction_drawing(
         panels=(Panel("friction", *axes, tuple(curves), "friction over speed"),),
         heading="Friction over speed",
         caption="What the valve did: the actuator force less spring and preload while the stem "
-        "surely slides, averaged in bins of its speed (upwards positive), with the lag of the fit. "
-        "No law of friction is assumed. Line: the fitted law. Diamonds: the sliding friction, "
-        "which is the mean over the distance, at the mean speed.",
+        "clearly slides, averaged in bins of its speed (upwards positive), with the lag of the "
+        "fit. No law of friction is assumed. Line: the fitted law. Diamonds: the sliding "
+        "friction, which is the mean over the distance, at the mean speed.",
         alt="Points of friction over the speed of the stem, in both directions, with the fitted "
         "law as a line through them.",
         region=None,

@@ -156,7 +156,7 @@ class IdentificationSettings:
         Standard deviation, s, of the whole time by which one signal may lag the other: clocks,
         damping of transmitters, a volume before the diaphragm. Used by the methods ``plant``
         (default 0.04 s, a plant without special care) and ``bench`` (default zero: on a bench the
-        signals are surely synchronous).
+        signals are clearly synchronous).
     area_uncertainty, drive_scale_uncertainty, position_scale_uncertainty : float
         Relative standard uncertainties (GUM), 0.02 for 2 %, of the diaphragm area, of the scale of
         the pressure sensor (for a drive that is a force: of the force sensor), and of the scale of

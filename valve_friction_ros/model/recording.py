@@ -23,7 +23,7 @@ from valve_friction_ros.model.drive import DEFAULT_LAG, Drive
 def require_row(name: str, values: object) -> NDArray[np.float64]:
     """Return a copy of a row of finite numbers, or raise ValueError with its name and the sample.
 
-    A masked value of a numpy array is no number.
+    A masked value of a numpy array is not a number.
     """
     try:
         row = np.array(values, dtype=np.float64)

@@ -46,7 +46,7 @@ def _start(node: str) -> int:
         return 0
     if rest := _not_of_ros():
         print(  # noqa: T201
-            f"cannot start: {rest[0]!r} is no argument of ROS: write --ros-args before all -r, -p "
+            f"cannot start: {rest[0]!r} is not a ROS argument: write --ros-args before all -r, -p "
             "and --params-file; see --help",
             file=sys.stderr,
         )

@@ -162,7 +162,7 @@ class PlayedTest:
         if self.phase is PlayPhase.PLAYING:
             raise RefusalError("the test is running: stop it first")
         if (doubt := self._doubt(now)) is not None:
-            raise RefusalError(f"nothing is played: {doubt}")
+            raise RefusalError(f"not started: {doubt}")
         self.phase, self.aborted, self._pending = PlayPhase.PLAYING, None, None
         self._begun = self._stepped = now
 

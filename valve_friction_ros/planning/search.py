@@ -404,7 +404,7 @@ def _resting(plan: StrokePlan) -> Iterator[str]:
     ):
         if not strokes(plan.valve, draw, plan.band):
             yield (
-                f"a friction {name} (F_s {draw.static_friction:.4g} N) may hold the stem: if the "
+                f"friction {name} (F_s {draw.static_friction:.4g} N) may hold the stem: if the "
                 "stem does not move, friction has grown at least to this value; widen the part of "
                 "the travel"
             )

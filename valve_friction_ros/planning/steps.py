@@ -202,15 +202,15 @@ def form_of(
         "",
         "ABORT    and go back slowly to the signal before the test, if",
         f"         the stem is below {100 * low:.0f} % ({lowest} {of_stem}) or above "
-        f"{100 * high:.0f} % ({highest} {of_stem}) of the travel, counted from its end "
-        "without air,",
+        f"{100 * high:.0f} % ({highest} {of_stem}) of the travel, measured from the end without "
+        "air,",
         f"         the pressure is below {pressure.shown(band.low - PRESSURE_MARGIN, 2)} or above "
         f"{pressure.shown(band.high + PRESSURE_MARGIN, 2)} {of_air},",
         f"         the stem has not moved after {_clock(_first_return(steps))} (min:s),",
         "         or the process moves further than ________________",
         "",
-        f"{'at':>8} {'within':>8} {'to %':>7} {'mA':>7} {of_air:>8}  done  stem {of_stem:<2}  "
-        "what it tells",
+        f"{'at':>8} {'within':>8} {'to %':>7} {'mA':>7} {of_air:>8}  done  stem {of_stem:<2}  what "
+        "it shows",
     ]
     lines += [
         f"{_clock(one.time):>8} {one.duration:>6.1f} s {100 * one.share:>7.1f} "

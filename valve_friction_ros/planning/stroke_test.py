@@ -168,7 +168,7 @@ class PressureBand(NamedTuple):
 
 
 def _held(one: KarnoppParameters) -> float:
-    """Return the force, N, that surely holds the stem back at the end of a stroke.
+    """Return the force, N, that clearly holds the stem back at the end of a stroke.
 
     A stem that swings, one with less than critical damping, may go on by the slip.
     """

@@ -48,7 +48,7 @@ class Columns:
     Raises ValueError, which names the field, if a value is impossible.
     """
 
-    time_column: str = _described("", "header of the time", "HEADER")
+    time_column: str = _described("", "header of the time column", "HEADER")
     time_unit: str = _described("", f"{_units('time')}; dates are recognized", "UNIT")
     time_zone: str = _described(
         "", "time zone of local times without one, such as Europe/Berlin; default: UTC", "ZONE"
@@ -56,14 +56,14 @@ class Columns:
     time_format: str = _described(
         "", "format of the dates, such as '%%d.%%m.%%Y %%H:%%M:%%S.%%f' (strptime)", "FORM"
     )
-    position_column: str = _described("", "header, or tag, of the stem position", "HEADER")
+    position_column: str = _described("", "header or tag of the stem position", "HEADER")
     position_unit: str = _described("", _units("position"), "UNIT")
     inverted_position: bool = _described(
         False,
-        "the position decreases as the pressure pushes the stem, such as the opening of an "
-        "air-to-close valve: take the travel (100 %%) less the position",
+        "the position falls as the pressure pushes the stem, like the opening of an air-to-close "
+        "valve: use the travel (100 %%) minus the position",
     )
-    pressure_column: str = _described("", "header, or tag, of the pressure", "HEADER")
+    pressure_column: str = _described("", "header or tag of the pressure", "HEADER")
     pressure_unit: str = _described("", _units("pressure"), "UNIT")
     pressure_range: str = _described(
         "", "range of a transmitter in mA or percent, as '0..2.5 bar'", "RANGE"
@@ -74,7 +74,7 @@ class Columns:
     opposing_area_ratio: float = _described(
         1.0, "area of the other side (that of the rod) over diaphragm_area", "RATIO"
     )
-    force_column: str = _described("", "header, or tag, of the force", "HEADER")
+    force_column: str = _described("", "header or tag of the force", "HEADER")
     force_unit: str = _described("", _units("force"), "UNIT")
     tag_column: str = _described("", "header of the tags, if each row holds one value", "HEADER")
     value_column: str = _described(
@@ -84,13 +84,13 @@ class Columns:
         "", "entries of the quality column that mark good values, separated by commas", "WORDS"
     )
     maximum_bad_share: float = _described(
-        0.05, "largest share of a signal's values that may be bad; those are left out", "SHARE"
+        0.05, "largest share of a signal's values that may be bad; bad values are left out", "SHARE"
     )
-    delimiter: str = _described("", "between the entries of a row: , ; tab …", "MARK")
+    delimiter: str = _described("", "separator between the entries of a row: , ; tab …", "MARK")
     decimal: str = _described("", "decimal mark, . or ,", "MARK")
-    encoding: str = _described("", "such as utf-16 or cp1252", "NAME")
+    encoding: str = _described("", "encoding, such as utf-16 or cp1252", "NAME")
     skip_rows: int = _described(
-        0, "rows to skip at the top; rows above the headers are recognized without it", "N"
+        0, "rows to skip at the top; rows above the headers are recognized automatically", "N"
     )
     comment: str = _described("", "leave out rows that begin with this mark, such as #", "MARK")
     sheet: str = _described("", "sheet of a workbook; default: the first", "NAME")

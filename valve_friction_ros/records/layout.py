@@ -136,7 +136,7 @@ class Layout:
             told = [f"{one.quantity} {quoted(one.name)}" + _in_unit(one.unit) for one in signals]
             parts.append((f"{name}: " if name else "") + ", ".join(told))
         if len(self.valves) > _MOST_LABELS:
-            parts.append(f"and {len(self.valves) - _MOST_LABELS} valves more")
+            parts.append(f"and {len(self.valves) - _MOST_LABELS} more valves")
         used = {signal.path for signals in self.valves.values() for signal in signals}
         if idle := [one.raw.path.name for one in files if self.valves and one.raw.path not in used]:
             parts.append(f"not needed: {', '.join(idle)}")
@@ -163,7 +163,7 @@ class Layout:
             return "time of the day"
         order = "day first, " if form.formats[0].startswith("%d") else ""
         order = "month first, " if form.formats[0].startswith("%m") else order
-        zone = "with their zone" if form.has_zone else form.zone or "UTC, as no zone is stated"
+        zone = "with their zone" if form.has_zone else form.zone or "UTC, because no zone is stated"
         return f"dates {order}{zone}"
 
 
@@ -392,8 +392,8 @@ class Look:
         if 2 * len(wide) > len(values):
             self.questions.append(
                 f"which header each entry has, of {len(wide[0])} entries and {len(names)} headers: "
-                "export it with another delimiter if its decimal commas divide numbers, else give "
-                "each column a header"
+                "export it with another delimiter if decimal commas split its numbers, otherwise "
+                "give each column a header"
             )
 
     def _kind(self, column: SeenColumn) -> str:

@@ -67,7 +67,7 @@ _UNCLEAR_ZONE = re.compile(
     r"\b(?:(?:UTC|GMT) ?[+\-−]\d{1,2}:?\d\d"
     r"|(?<=[([ ])(?:CES?T|MES?Z|[ECMP][SD]T|BST|IST|JST|AEST))\b"
 )
-"""Zones that are no name of the time zone database: offsets with minutes, abbreviations."""
+"""Zones that are not names in the time zone database: offsets with minutes, abbreviations."""
 
 _LOCAL = ("d", "microdays")
 """Units of clocks that count days: they are in local time, as in spreadsheets."""
@@ -304,7 +304,7 @@ class _Recognition(Look):
                     found.setdefault(cells)
             if len(found) > _MOST_TAGS:
                 raise ValueError(
-                    f"{self.raw.path}: more than {_MOST_TAGS} tags: name the --tag-column"
+                    f"{self.raw.path}: more than {_MOST_TAGS} tags: give the --tag-column"
                 )
         return list(found)
 

@@ -57,14 +57,14 @@ def _require_ranges(signals: Sequence[TableSignal], valve: Valve, form: Columns)
         if is_share and one.quantity == "pressure":
             if not all(map(math.isfinite, _pressure_range(valve, form))):
                 lacking[
-                    f"a pressure in {one.unit} is a share of the transmitter's range: name it "
-                    "(--pressure-range '0..2.5 bar', or pressure_minimum and pressure_maximum of "
-                    "the valve file)"
+                    f"a pressure in {one.unit} is a share of the transmitter's range: specify the "
+                    "range (--pressure-range '0..2.5 bar', or pressure_minimum and "
+                    "pressure_maximum of the valve file)"
                 ] = one
         elif one.quantity == "position" and (is_share or form.inverted_position):
             needs = f"a position in {one.unit}" if is_share else "an inverted position"
             if not math.isfinite(valve.travel):
-                lacking[f"{needs} is a share of the travel: name the travel in the valve file"] = (
+                lacking[f"{needs} is a share of the travel: give the travel in the valve file"] = (
                     one
                 )
     if lacking:
@@ -103,7 +103,7 @@ def _require_readable(read: ReadSignal, valve: Valve, pressure: NDArray[np.float
         raise ValueError(
             f"{read.signal.path}: {read.place(sample)}: {read.values[sample]:g} {unit} is outside "
             f"the sensor's range {valve.pressure_minimum:g} to {valve.pressure_maximum:g} Pa: use "
-            "a stretch of the record without it, name its unit, or correct the range"
+            "a stretch of the record without it, specify its unit, or correct the range"
         )
 
 
@@ -234,9 +234,9 @@ def _is_bag(path: Path, options: ReadingOptions) -> bool:
     if not is_bag(place):
         return False
     if options.beside:
-        raise ValueError(f"{path}: a bag holds all signals of its valves: give it alone")
+        raise ValueError(f"{path}: a bag contains all signals of its valves: give it alone")
     if place != path:
-        raise ValueError(f"{path}: a bag cannot come through a pipe: name its folder or file")
+        raise ValueError(f"{path}: a bag cannot be read from a pipe: give its folder or file")
     if options.columns.opposing_pressure_column:
         raise ValueError(
             f"{path}: the actuator is double-acting (opposing_pressure_column), but a bag has one "

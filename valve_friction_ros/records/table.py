@@ -272,7 +272,7 @@ class _Reader:
         if max(sum(each.stamps.size for each in part.blocks) for part in parts) > most:
             raise ValueError(
                 f"{self.path}: more than {most} rows: raise maximum_rows (--maximum-rows), or "
-                "choose a part by --begin and --end"
+                "choose a part with --begin and --end"
             )
 
     def _in_order(self, read: ReadSignal) -> ReadSignal:
@@ -370,7 +370,7 @@ class OpenTables:
         if is_lone and layout.raw.is_text and not layout.times:
             (only, *_) = (*layout.headers, "")
             return (
-                f"{self.name}: only one column, {quoted(only)}: name the delimiter of the file "
+                f"{self.name}: only one column, {quoted(only)}: specify the delimiter of the file "
                 "(--delimiter)"
             )
         return f"{self.name}: cannot tell {'; '.join(questions)}"
@@ -384,7 +384,7 @@ class OpenTables:
             if form.is_assumed and stamps.size and 0 < np.ptp(stamps) < _SHORTEST:
                 found[
                     f"the unit of the time {quoted(layout.headers[read.signal.time[0]])}, which "
-                    f"rises by {np.ptp(stamps) / 1e9:g} in all (--time-unit s or --time-unit min)"
+                    f"rises by {np.ptp(stamps) / 1e9:g} in total (--time-unit s or --time-unit min)"
                 ] = None
             if question := _unlikely_unit(read, self.given):
                 found[question] = None

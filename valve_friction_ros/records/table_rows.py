@@ -305,9 +305,9 @@ def _explained(path: Path, is_text: bool) -> Iterator[None]:
             raise
         cause = " ".join(cause_of(error).split())[:200] or type(error).__name__
         if cause.endswith("and found 0"):  # message of pandas for a block of blank lines
-            cause = f"{BLOCK} blank rows in succession: remove them"
+            cause = f"{BLOCK} consecutive blank rows: remove them"
         if isinstance(error, UnicodeError):
-            cause = f"{error}: name its encoding (--encoding)"
+            cause = f"{error}: specify its encoding (--encoding)"
         kind = "CSV" if is_text else "a table"
         raise ValueError(f"{path}: cannot be read as {kind}: {cause}") from None
 
@@ -366,7 +366,7 @@ def _require_table(head: Sequence[str]) -> None:
     if _PAGE.match(start):
         raise ValueError("a page in HTML or XML: save it from a spreadsheet as .xlsx or CSV")
     if _JSON.match(start):
-        raise ValueError("JSON: save it as CSV, a row for each time")
+        raise ValueError("JSON: save it as CSV, one row for each time")
     if len(_CONTROL.findall(start)) > max(_FEW_CONTROL, _MOST_CONTROL * len(start)):
         raise ValueError("a binary file: export it as CSV, .xlsx, Parquet or MAT (version 7)")
 
@@ -411,7 +411,9 @@ def _excel(path: Path, form: Columns, places: Sequence[int] | None) -> Iterator[
 
     with zipfile.ZipFile(path) as packed:
         if "[Content_Types].xml" not in packed.namelist():
-            raise ValueError("an archive, but no workbook of Excel: unpack it, or save it as .xlsx")
+            raise ValueError(
+                "an archive, but not an Excel workbook: unpack it, or save it as .xlsx"
+            )
         size = sum(each.file_size for each in packed.infolist()) / 1e6
     openpyxl = _library("openpyxl")
     if size > form.maximum_megabytes:
@@ -453,7 +455,9 @@ def _matlab(path: Path, form: Columns, places: Sequence[int] | None) -> Iterator
     try:
         found = loadmat(path, squeeze_me=True)
     except NotImplementedError:
-        raise ValueError("a MAT-file of version 7.3: save it with -v7, or by writetable") from None
+        raise ValueError(
+            "a MAT-file of version 7.3: save it with -v7, or with writetable"
+        ) from None
     vectors = {
         name: np.asarray(values, np.float64)
         for name, values in found.items()
@@ -462,7 +466,7 @@ def _matlab(path: Path, form: Columns, places: Sequence[int] | None) -> Iterator
     longest = max((each.size for each in vectors.values()), default=0)
     if not longest:
         others = ", ".join(name for name in found if not name.startswith("__")) or "nothing"
-        raise ValueError(f"no vectors of numbers, but {others}: save each signal as a vector")
+        raise ValueError(f"no numeric vectors, but {others}: save each signal as a vector")
     frame = pd.DataFrame({name: v for name, v in vectors.items() if v.size == longest})
     yield frame if places is None else frame.iloc[:, list(places)]
 
@@ -474,9 +478,9 @@ _READERS: Mapping[bytes, Callable[..., Iterator["pd.DataFrame"]]] = {
 }
 """Readers of files of cells, by their first bytes."""
 _UNREAD = {
-    b"\xd0\xcf\x11\xe0": "a workbook of Excel before 2007: save it as .xlsx or CSV",
+    b"\xd0\xcf\x11\xe0": "an Excel workbook from before 2007: save it as .xlsx or CSV",
     b"\x89HDF": "an HDF5 file: save it as Parquet or CSV",
     b"ARRO": "a Feather file: save it as Parquet or CSV",
-    b"TDSm": "a TDMS file of LabVIEW: export it as .lvm or CSV",
+    b"TDSm": "a LabVIEW TDMS file: export it as .lvm or CSV",
 }
 """Files that cannot be read, by their first bytes."""

@@ -133,14 +133,14 @@ def valve_description(answers: Mapping[str, Any], columns: Mapping[str, Any]) ->
     """
     lines = [
         "# A valve for `valve_friction ... --valve`, and for nodes by --params-file; commands",
-        "# read it with or without the first two lines, which ROS 2 wants. SI units.",
+        "# read it with or without the first two lines, which ROS 2 needs. SI units.",
         f"# Air to {answers['air_to']}, {answers['acting']}-acting.",
         "/**:",
         "  ros__parameters:",
         *(_line(*each) for each in _valve(answers)),
     ]
     if of_tables := [f"  {_line(*each)}" for each in _columns(answers, columns)]:
-        lines += ["", "    columns:  # how its tables are written", *of_tables]
+        lines += ["", "    columns:  # format of its tables", *of_tables]
     return "\n".join(lines) + "\n"
 
 

@@ -67,7 +67,7 @@ def read_yaml(path: Path) -> Any:
     except yaml.YAMLError as error:
         raise ValueError(f"{path}: not YAML: {' '.join(str(error).split())[:300]}") from None
     except RecursionError:
-        raise ValueError(f"{path}: not YAML of a valve: it is nested too deeply") from None
+        raise ValueError(f"{path}: not a valve file: its YAML is nested too deeply") from None
     except (OSError, ValueError) as error:
         raise ValueError(f"{path}: cannot be read: {cause_of(error)}") from None
 

@@ -65,7 +65,7 @@ _VERDICTS = (
     "value was given."
 )
 _FRICTION = "Friction compared with its baseline"
-_WHOLE_VALVE = "Other changes of the valve"
+_WHOLE_VALVE = "Other changes in the valve"
 _NOTHING_ELSE = "Nothing else has changed significantly"
 _BUDGET = (
     "Sources of the interval widths. From record: noise, motion that the model does not explain, "
@@ -88,7 +88,7 @@ def identification_report(record: IdentifiedRecord) -> Page:
 
     The page begins with status, diagnosis in one sentence, and date. Sections follow: parameters,
     uncertainty budget, friction and other numbers of the valve compared with the baseline, trend,
-    use, answer to the command, record, valve signature, evidence of the method, measured and
+    use, response to the command, record, valve signature, evidence of the method, measured and
     simulated position, residual, notes, settings and versions. Sections without content are left
     out.
     """
@@ -148,8 +148,9 @@ def _friction(record: IdentifiedRecord) -> Section:
     table = friction_table(record)
     if record.baseline is None:
         none = Paragraph(
-            "Excess friction is unknown, because this valve has no baseline: nothing on this page "
-            "says that the valve is healthy. The baseline is the friction of the healthy valve."
+            "Whether friction is excessive is unknown, because this valve has no baseline: nothing "
+            "on this page says that the valve is healthy. The baseline is the friction of the "
+            "healthy valve."
         )
         return Section(_FRICTION, (none, table))
     return Section(_FRICTION, (table,))
@@ -247,7 +248,7 @@ def _noise_words(misfit: Misfit | None) -> str:
 
 _MEANING = (
     "A stroke is counted only if it exceeds the counting dead band, so noise is not counted. A "
-    "breakaway is a start after a rest of one second or more. Time that was not watched is not "
+    "breakaway is a start after a rest of one second or more. Time that was not monitored is not "
     "included anywhere."
 )
 
@@ -265,7 +266,7 @@ def usage_section(
     """Return table and figure of the usage, since the renewal of the packing and in total.
 
     With `limits`, add each limit of the packing and when it is expected to be reached. Return None
-    for a valve that was not watched.
+    for a valve that was not monitored.
     """
     used, everything = usage.since_renewal, usage.total
     if not everything.time_watched:
@@ -282,7 +283,7 @@ def usage_section(
     if pace is not None:
         words += (
             f" Recent pace: {pace.distance:.3g} m and {pace.reversals:.3g} reversals per day "
-            "watched."
+            "monitored."
         )
     if not used.time_watched:
         return Section("Use", (table, *life, Paragraph(words)))
@@ -299,7 +300,7 @@ def _life(limits: Sequence[LimitState]) -> tuple[PageTable | Paragraph, ...]:
     """Return the used share of each packing limit, and the advice."""
     if not limits:
         return (Paragraph(_NO_LIMIT),)
-    titles = ("limit of the packing", "used", "limit", "share", "expected")
+    titles = ("packing limit", "used", "limit", "share", "expected")
     columns = tuple(Column(title, is_number=title != titles[0]) for title in titles)
     rows = tuple(
         (
@@ -319,17 +320,17 @@ def _expected(state: LimitState) -> str:
     if state.is_reached:
         return "reached"
     if state.expected is None:
-        return "not known before a day of watching"
+        return "not known before a day of monitoring"
     return utc_day(state.expected)
 
 
 def _usage_cells(usage: Usage, valve: Valve) -> dict[str, str]:
     return {
         "travelled distance [m]": f"{usage.distance:.5g}",
-        "strokes of the whole travel": f"{usage.strokes(valve.travel):.5g}",
+        "full-travel strokes": f"{usage.strokes(valve.travel):.5g}",
         "reversals": f"{usage.reversals}",
         "breakaways": f"{usage.breakaways}",
-        "time watched [h]": f"{usage.time_watched / 3600e9:.4g}",
+        "time monitored [h]": f"{usage.time_watched / 3600e9:.4g}",
         "time near 0 % of the travel [h]": f"{usage.time_near_seat() / 3600e9:.4g}",
         "time near 100 % of the travel [h]": f"{usage.time_near_seat(True) / 3600e9:.4g}",
     }
@@ -375,7 +376,7 @@ def response_section(response: ResponseSummary) -> Section | None:
         f"{len(response.ignored)} of them did not move the stem. "
         "Steady error is command less position."
     )
-    return Section("Answer to the command", (table, sizes, Paragraph(words), Paragraph(causes)))
+    return Section("Response to the command", (table, sizes, Paragraph(words), Paragraph(causes)))
 
 
 def _spread_cells(spread: Spread, scale: float) -> tuple[str, ...]:

@@ -157,15 +157,15 @@ def friction_table(record: IdentifiedRecord) -> PageTable:
         if any(one.uncalibrated for one in record.result.parameters.values()):
             rows.append(
                 (
-                    "uncertainty of the calibration",
-                    "left out of this comparison: the same area and sensors scale both frictions "
-                    "alike, which cancels in their ratio",
+                    "calibration uncertainty",
+                    "left out of this comparison: the same area and sensors scale both friction "
+                    "values alike, which cancels in their ratio",
                 )
             )
         rows += [
             ("excess friction", f"{'+' * (excess > 0)}{with_width(excess, width)} N"),
             (
-                "friction over baseline",
+                "friction ratio to baseline",
                 f"{ratio.what}: {ratio.value:.2f}, {ratio_interval(ratio.low, ratio.high)}",
             ),
             (
@@ -329,12 +329,12 @@ def published_words(result: Result) -> str:
     words = (
         "Published method: the regression of the paper, for comparison. It uses derivatives of "
         f"the smoothed position, and only {samples}. Noise, smoothing, lags and slow sliding bias "
-        f"it; it has no interval, and yields a number even where the record determines none. "
+        "it; it has no interval, and gives a number even where the record determines none. "
         f"{_how_else(result)}If the two differ, trust the value, not the published one."
     )
     outside = [one for one in beside if 0 < one.half_width < abs(one.published - one.value)]
     if not outside:
-        return f"{words} Here every published value that has an interval lies within it."
+        return f"{words} Here every published value lies within the interval, if there is one."
     told = "; ".join(
         f"{words_of(one.name)}: {written(one.published)} against {written(one.value)} {one.unit}"
         for one in outside

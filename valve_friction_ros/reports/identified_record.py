@@ -262,8 +262,8 @@ def what_to_do(diagnosis: Diagnosis, findings: Sequence[Finding] = ()) -> str:
 def diagnosis_sentence(record: IdentifiedRecord) -> str:
     """Return the diagnosis in one sentence: finding, certainty, consequence and advice.
 
-    It states the diagnosis of the monitor for readers outside control engineering. Other changes of
-    the valve follow, one sentence each.
+    It states the diagnosis of the monitor for readers outside control engineering. Other changes
+    in the valve follow, one sentence each.
     """
     friction = _friction(record)
     state = record.diagnosis.state
@@ -273,9 +273,7 @@ def diagnosis_sentence(record: IdentifiedRecord) -> str:
         finding, advice = _STATE_WORDS[state].format(ratio=size), friction_advice(state.name)
     elif math.isnan(friction.value):
         finding = f"this record does not determine the friction ({friction.reason})"
-        advice = (
-            "move the valve through several fast strokes in both directions and identify it again"
-        )
+        advice = "stroke the valve quickly several times in both directions and identify it again"
     elif friction.value < 0:
         finding = (
             f"the identified friction is {friction.value:.4g} N, but friction cannot be negative"
@@ -320,8 +318,8 @@ def _found(record: IdentifiedRecord) -> tuple[str, str]:
     )
     if record.is_scaled:
         advice = (
-            f"before any work on the packing, check {drive_scale(record.valve)}, as the spring "
-            "constant has changed by the same factor"
+            f"before any work on the packing, check {drive_scale(record.valve)}, because the "
+            "spring constant has changed by the same factor"
         )
         return f"the friction seems to have changed, {ratio}", advice
     if (what := _STATE_WORDS.get(diagnosis.state)) is not None:

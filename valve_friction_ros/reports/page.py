@@ -202,7 +202,7 @@ def require_report_file(path: Path) -> None:
     if path.suffix.lower() not in _ENDINGS:
         raise ValueError(f"{path}: a report is an HTML page: give it a name that ends in .html")
     if not path.parent.is_dir():
-        raise ValueError(f"{path}: there is no folder {path.parent}: create it, or name another")
+        raise ValueError(f"{path}: there is no folder {path.parent}: create it, or choose another")
     if path.is_dir():
         raise ValueError(f"{path}: this is a folder: give the report another name")
     try:

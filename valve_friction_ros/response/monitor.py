@@ -79,7 +79,7 @@ class ResponseMonitor:
     summary : ResponseSummary
         Summary of the latest 200 moves.
     left_out : int
-        Number of changes of the command that are no evaluated moves.
+        Number of changes of the command that are not evaluated as moves.
     hunting : Hunting or None
         The present limit cycle.
     clock_offset : float

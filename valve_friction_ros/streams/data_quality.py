@@ -10,7 +10,7 @@
 """Quality of the samples of a valve: faults of the data, with their numbers.
 
 `DataQuality` sees each arrival, whether it was accepted, and the clocks. It judges by arrivals
-alone: a sensor that reports rarely and a stem at rest are no faults. The stamps of both signals may
+alone: neither a rarely reporting sensor nor a stem at rest is a fault. The stamps of both may
 differ by as much as a signal advances from one look to the next, so a recording may be played at
 any speed. `LossCounter` counts messages that never arrived, and the publishers that send at once,
 by the sequence numbers of the publishers.
@@ -41,7 +41,7 @@ _MOST_PUBLISHERS = 16
 _SENDS = 5.0
 """Time, s, for which a silent publisher still counts among those that send."""
 _SIDE_BY_SIDE = 2.0
-"""Time, s, for which publishers send at once before they count: a restart is no second one."""
+"""Time, s, for which several publishers must send to be reported: a restart is shorter."""
 
 
 class Losses(NamedTuple):

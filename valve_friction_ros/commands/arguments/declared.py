@@ -55,11 +55,11 @@ def _identify(parser: argparse.ArgumentParser) -> None:
     add_options(
         parser,
         """
-        --plot FILE.png: draw the identification
-        --report FILE.html: write a page for people, one file: diagnosis, parameters, pictures,
+        --plot FILE.png: plot the identification
+        --report FILE.html: write a self-contained report page: diagnosis, parameters, pictures,
             settings
-        --baseline-coulomb-friction N: F_c of this valve when it was healthy; its diagnosis compares
-            with it
+        --baseline-coulomb-friction N: F_c of this valve when it was healthy, with which the
+            diagnosis compares
         --baseline-half-width N: half width of the 95 %% interval of the baseline (0: exact)
         --baseline-recording FILE: recording of this valve when it was healthy, read and identified
             with the same options; its friction is the baseline, and --report draws its signature
@@ -81,7 +81,7 @@ def _inspect(parser: argparse.ArgumentParser) -> None:
         "settles it."
     )
     add_recording_arguments(parser)
-    add_options(parser, "--plot FILE.png: draw the recording\n--json: print one JSON object")
+    add_options(parser, "--plot FILE.png: plot the recording\n--json: print one JSON object")
 
 
 def _identify_folder(parser: argparse.ArgumentParser) -> None:
@@ -106,8 +106,8 @@ def _identify_folder(parser: argparse.ArgumentParser) -> None:
         --output FILE: FILE.csv, FILE.jsonl (JSON lines) or FILE.html (a page that ranks the
             valves), written at the end and on interruption; may be repeated; until then FILE.sqlite
             holds the rows in the order in which they were finished
-        --no-reports: with FILE.html: write no page per valve in the folder FILE_reports, which
-            takes a second and half a megabyte each
+        --no-reports: with FILE.html: do not write a report per valve into FILE_reports (each
+            takes a second and half a megabyte)
         --baselines FILE.csv: friction of the healthy valves, with which the diagnosis compares: an
             earlier output of this command for a folder with the same names, or a table with the
             columns recording (empty: any), valve and coulomb_friction_n
@@ -130,7 +130,7 @@ def _identify_folder(parser: argparse.ArgumentParser) -> None:
         --jobs N: number of recordings identified in parallel, one process each (one per core)
         --scheduler ADDRESS: use the workers of a Dask cluster, which must see DIR under the same
             path, instead of local processes; tcp://host:8786 or tls://host:8786 (extra `cluster`)
-        --retry-failed: identify again the recordings that were refused before
+        --retry-failed: retry recordings that were refused before
         --redo: replace rows that were computed with other options
         """,
         jobs={"type": int},
@@ -160,7 +160,7 @@ def _describe_valve(parser: argparse.ArgumentParser) -> None:
             metavar="ANSWER",
             help=f"{each.words}: {each.example}" + (f" ({each.default})" if each.default else ""),
         )
-    add_table_arguments(parser, "format of its tables, stored in the section `columns:`")
+    add_table_arguments(parser, "format of the valve's tables, stored in the section `columns:`")
 
 
 def _plan_test(parser: argparse.ArgumentParser) -> None:
@@ -177,7 +177,7 @@ def _plan_test(parser: argparse.ArgumentParser) -> None:
         parser,
         """
         --valve VALVE.yaml: the valve file
-        --valve-name NAME: which of several valves in the valve file or in --history
+        --valve-name NAME: valve to use if the valve file or --history holds several
         """,
         valve={"required": True},
     )
@@ -186,15 +186,15 @@ def _plan_test(parser: argparse.ArgumentParser) -> None:
         parser,
         """
         --output FILE.csv: corners of the pressure signal: time_s and pressure_pa (%(default)s)
-        --table FILE.csv: set points with their times in %%, mA and pressure, abort positions, and
-            what each step determines: for a control system without ROS
-        --form FILE.txt: the same as a partial-stroke test form, for a person with a stopwatch
-        --pressure-unit UNIT: of --table and --form: kPa, bar, psi … (%(default)s)
-        --position-unit UNIT: of --table and --form: mm, in … (%(default)s)
+        --table FILE.csv: for a control system without ROS: set points with their times in %%, mA
+            and pressure, abort positions, and what each step determines
+        --form FILE.txt: the same as a partial-stroke test form, for an operator with a stopwatch
+        --pressure-unit UNIT: pressure unit of --table and --form: kPa, bar, psi … (%(default)s)
+        --position-unit UNIT: position unit of --table and --form: mm, in … (%(default)s)
         --signal-range RANGE: pressures at 0 and 100 %% signal, such as '0.2..1.0 bar' (the spring
             range)
         --replace: overwrite an existing file
-        --figure FILE.png: draw pressure and expected stem
+        --figure FILE.png: plot pressure and expected stem
         --json: print one JSON object
         """,
         output={"default": Path("stroke_test.csv")},

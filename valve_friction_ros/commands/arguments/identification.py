@@ -44,7 +44,7 @@ def add_identification_arguments(parser: argparse.ArgumentParser) -> None:
         kind = float if one.default is None else type(one.default)
         usual = f" ({one.default})" if one.is_given(one.default) else ""
         nothing = "unset" if kind is float else "0"
-        words = one.description.replace(" [-]", "").replace(f"; {nothing}:", "; without it:")
+        words = one.description.replace(" [-]", "").replace(f"; {nothing}:", "; default:")
         parser.add_argument(
             one.option,
             type=one.spell if kind is str else kind,
@@ -129,8 +129,8 @@ def add_fail_on(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--fail-on",
         choices=("warn", "error"),
-        help="exit code 3 if a diagnosis is as severe as this, or more severe; without a baseline "
-        "no friction is compared and no alarm is raised",
+        help="exit with code 3 if a diagnosis is at least this severe; without a baseline no "
+        "friction is compared and no alarm is raised",
     )
 
 

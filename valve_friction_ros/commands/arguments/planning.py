@@ -65,7 +65,7 @@ def _add_known(parser: argparse.ArgumentParser) -> None:
         f"""
         --estimate ESTIMATE.json: an earlier result, as `valve_friction identify --json` prints it
         --history {PLACE}: the last identification in the identifiers' history_file, or on their
-            server; of several valves that of --valve-name
+            server; if there are several valves, that of --valve-name
         """,
         history={"type": history_place},
     )

@@ -44,7 +44,7 @@ def add_recording_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         nargs="*",
         metavar="FILE",
-        help="further tables of the same valve, where pressure and position have a file each",
+        help="further tables of the same valve, if pressure and position are in separate files",
     )
     add_options(
         parser,
@@ -77,7 +77,7 @@ def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
             valve
         --stem-topic TOPIC: stem topic, likewise
         --joint NAME: joint that is the stem (the only one, or 'stem')
-        --valve-name NAMESPACE: which of several valves
+        --valve-name NAMESPACE: valve to use if the bag holds several
         """,
     )
     add_table_arguments(
@@ -228,8 +228,8 @@ def described(
         has_force = holds_force(path, reading)
     if not has_force:
         raise ValueError(
-            "pressure needs the diaphragm_area: give a valve file by --valve; "
-            "`valve_friction describe-valve` writes one"
+            "pressure needs the diaphragm_area: give a valve file with --valve; `valve_friction "
+            "describe-valve` writes one"
         )
     return ValveFile(Valve(), MappingProxyType({})), reading
 

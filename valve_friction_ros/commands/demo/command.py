@@ -245,7 +245,7 @@ def _report(
     console.print(diagnosis, style="bold", highlight=False, markup=False)
     missed = [f"{name} ({outcome.label})" for outcome in outcomes for name in outcome.missed()]
     if missed:
-        console.print(f"outside the tolerance: {', '.join(missed)}", style="bold red")
+        console.print(f"outside tolerance: {', '.join(missed)}", style="bold red")
     if level != Level.ERROR:
         console.print("the excess friction was not diagnosed", style="bold red")
     save_picture(friction_figure([outcome.case for outcome in outcomes], diagnosis), output)

@@ -379,11 +379,11 @@ class AlarmStates:
         self._body = element("div")
         self._answer = _RequestLine()
         if self._context.visitors.may_operate():
-            with element("div", "vf-actions", role="group", aria_label="Alarms of this valve"):
+            with element("div", "vf-actions", role="group", aria_label="Alarms for this valve"):
                 for action in (AlarmAction.TAKE_OUT, AlarmAction.PUT_BACK):
                     ui.button(
                         f"{_ACTIONS[action]} …",
-                        on_click=partial(self._ask, "All alarms of this valve", None, [action]),
+                        on_click=partial(self._ask, "All alarms for this valve", None, [action]),
                         color=None,
                     ).props("no-caps unelevated dense").classes("vf-act")
 

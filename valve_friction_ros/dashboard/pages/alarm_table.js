@@ -9,7 +9,7 @@ export default {
         <th scope="col">{{ journal ? "Time" : "Since" }}</th><th scope="col">Valve</th>
         <th scope="col">Alarm</th><th scope="col">State</th><th scope="col">What to do</th>
         <th scope="col">{{ journal ? "Event" : "Last event" }}</th>
-        <th scope="col" v-if="!journal && may">Answer</th>
+        <th scope="col" v-if="!journal && may">Action</th>
       </tr></thead>
       <tbody>
         <tr v-for="row in near" :key="row.i" v-memo="[row]">

@@ -268,7 +268,7 @@ class _ComparePage:
         names = {node: f"{tag}   {node.rpartition('/')[0]}" for tag, node in valves}
         chosen = self._nodes[side] if self._nodes[side] in names else None
         kept = await self._history(side)
-        times = {_NOW: "as it is now" if self._context.is_live else "the latest"}
+        times = {_NOW: "current state" if self._context.is_live else "the latest"}
         if kept is not None:
             for entry in reversed(kept.entries[-_MOST_CHOICES:]):
                 if not entry.refusal:

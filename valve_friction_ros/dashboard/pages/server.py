@@ -46,7 +46,7 @@ def require_free(host: str, port: int) -> None:
             tried.bind((host, port))
         except OSError as error:
             raise ValueError(
-                f"{host}:{port} cannot be opened ({error.strerror}): give another port"
+                f"{host}:{port} cannot be opened ({error.strerror}): use another port"
             ) from None
 
 

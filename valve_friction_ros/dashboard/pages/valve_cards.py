@@ -145,7 +145,7 @@ def draw_trend(
         if not problem:
             text("p", "The history contains no identification of this valve.", "vf-none")
         return
-    with element("div", "vf-filters", role="group", aria_label="Time that is shown"):
+    with element("div", "vf-filters", role="group", aria_label="Time range"):
         for name, span in {**RANGES, "all": None}.items():
             with element("button", "vf-filter", type="button") as button:
                 ui.label(name)

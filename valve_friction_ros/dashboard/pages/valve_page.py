@@ -323,9 +323,9 @@ _SLOWER = 5
 _LISTS = (
     ("changes", "Changes since the baseline", "Nothing has been compared with a baseline yet."),
     ("evidence", "Moves in service", "No moves have been evaluated yet."),
-    ("usage", "Usage of the packing", "No usage recorded yet."),
-    ("fit", "Fit of the model", "No estimate yet."),
-    ("command", "Answer to the command", "No stem_command has been received."),
+    ("usage", "Packing usage", "No usage recorded yet."),
+    ("fit", "Model fit", "No estimate yet."),
+    ("command", "Response to the command", "No stem_command has been received."),
     ("counters", "Node and samples", "Nothing has been received yet."),
 )
 """Group of values, title of its card, and text of an empty card."""
@@ -394,7 +394,7 @@ class _ValvePage:
                 self._states = AlarmStates(self._context, self._node, self._page.zone)
                 self._states.draw()
             if self._context.is_live:
-                with card("Recordings of alarms") as self._alarms_body:
+                with card("Alarm recordings") as self._alarms_body:
                     pass
             with card("Reports and recordings") as self._files_body:
                 pass

@@ -396,7 +396,7 @@ def set_anew_at_rests(record: FittedRecord) -> FittedRecord:
 
     A resting stem has forgotten all but its position, so each move is independent: a single jump
     that is simulated at the wrong time then spoils no other. The price is the noise of that
-    position. A stem that surely creeps does not rest.
+    position. A stem that clearly creeps does not rest.
     """
     positions = np.interp(
         np.arange(record.force.size) * record.period, record.time, record.position

@@ -9,7 +9,7 @@
 
 """Friction over speed as a record shows it, before any stem is simulated.
 
-While the stem surely slides, the actuator force is
+While the stem clearly slides, the actuator force is
 
     F(t − τ) = F_c·sgn ẋ + (F_s − F_c)·exp(−(ẋ/v_s)²)·sgn ẋ + F_v·ẋ + k·x + F_0 + … ,
 
@@ -136,7 +136,7 @@ class FrictionCurve:
     Each bin has the mean velocity `speed` (m/s, negative downward), the mean friction there and its
     standard error (N); no law is assumed except that of the spring. The `numbers` are parameters
     and sliding friction, which holds at the `sliding_speed`, the mean speed over the distance.
-    `stribeck_velocity` is 0 where friction does not surely fall with speed; `lag` is the most
+    `stribeck_velocity` is 0 where friction does not clearly fall with speed; `lag` is the most
     probable time by which the stem is seen late, s; `fit` is the share of the force that the
     balance reproduces, `misfit` the deviation of the residual, N, and `inflation` that over what
     noise explains. Whole strokes have neither a correlation of the numbers nor a posterior.
@@ -183,7 +183,7 @@ def friction_curves(
     """Regress friction over speed, for several averaging times, the shortest first.
 
     The `fixed` parameters are known; a spring constant of 0 is a machine without a spring. Where
-    the stem nowhere surely slides both ways, or whole strokes exclude the result of a single
+    the stem nowhere clearly slides both ways, or whole strokes exclude the result of a single
     averaging time, only the curve of the strokes is returned, with the sliding friction
     (`_by_strokes`); nothing with too few strokes.
     """

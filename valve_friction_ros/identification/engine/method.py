@@ -94,7 +94,7 @@ _SAME_SPEED = 0.1
 speeds of simulated stems, with and without noise, were up to 4 % too low."""
 
 _CLEARLY = 1.0 / 3.0
-"""Half width over the sliding friction below which force and stem surely belong together.
+"""Half width over the sliding friction below which force and stem clearly belong together.
 
 Chosen: noise, drift or another valve's pressure gave 0.49 and more in 116 records."""
 
@@ -239,7 +239,7 @@ def _comparable(sliding: Estimated, exponent: Estimated | None) -> dict[str, flo
 
 
 def _dissipates(balanced: Mapping[str, Estimated]) -> bool:
-    """Whether friction surely takes work from the force, as it does if both belong to one valve.
+    """Whether friction clearly takes work from the force, as it does if both belong to one valve.
 
     A force that its converter rounds coarsely may still belong to that valve.
     """

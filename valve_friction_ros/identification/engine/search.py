@@ -36,7 +36,7 @@ from valve_friction_ros.identification.engine.posterior_fit import PosteriorFit,
 from valve_friction_ros.identification.refusal import RefusalError
 
 _SLIDING = 0.15
-"""Share of the top speed above which a stem surely slides."""
+"""Share of the top speed above which a stem clearly slides."""
 
 _DRY_SHARES = (0.3, 0.5, 0.7, 0.85, 0.95, 1.0)
 """Shares of the sliding friction to start F_c from; the rest is viscous."""
@@ -50,7 +50,7 @@ shows the way."""
 
 
 class Sliding(NamedTuple):
-    """Sliding friction, N, at the mean speed, m/s, and the spring of a stem that surely slides."""
+    """Sliding friction, N, at the mean speed, m/s, and the spring of a stem that clearly slides."""
 
     friction: float
     speed: float
@@ -119,7 +119,7 @@ def lagging(at: Coordinates, timing_uncertainty: float) -> list[Coordinates]:
 _SLIP_SHARES = (0.35, 0.55, 0.75, 0.9)
 _SLIPS = (0.15, 0.4, 0.8)
 _FALLS = (0.05, 0.2)
-"""Stribeck speeds to start from, over the sliding speed, where the stem surely slips."""
+"""Stribeck speeds to start from, over the sliding speed, where the stem clearly slips."""
 
 _LIMIT_VELOCITIES = (2e-4, 6e-4)
 _SUSPICIOUS = 1.5
@@ -540,7 +540,7 @@ def _likeliest(fits: Sequence[PosteriorFit]) -> PosteriorFit:
 
 
 def _lowest(fits: Sequence[PosteriorFit]) -> PosteriorFit:
-    """Return the first fit, or one with a surely lower cost.
+    """Return the first fit, or one with a clearly lower cost.
 
     A stem behind a slow sensor is taken only where the record demands it. Without viscous friction
     a stem jumps with the noise of the pressure: its halves differ, which lowers the sum of their

@@ -46,7 +46,7 @@ _FEW_PAUSES, _PAUSE = 0.05, 3.0
 """A signal is sent on change if more than this share of its pauses are so many times the usual."""
 
 _MARGIN = 2.0
-"""Distance of an average from a rest or a reversal, in averaging lengths, at which the stem surely
+"""Distance of an average from a rest or a reversal, in averaging lengths, at which the stem clearly
 slides."""
 
 _TINY = float(np.finfo(float).tiny)
@@ -70,7 +70,7 @@ _STROKE_NOISE, _STROKE = 6.0, 0.03
 the stem's noise and as a share of its range: a wandering sensor, or its last bit, moves no stem."""
 
 _SURE_STROKE = 3.0
-"""Length of a run, over the least stroke, above which it is surely a stroke."""
+"""Length of a run, over the least stroke, above which it is clearly a stroke."""
 
 _END_NOISE = 3e-3
 """Noise over the range that may be left at the ends of the strokes.
@@ -168,7 +168,7 @@ class MeasuredSignal(NamedTuple):
     def mean_speed(self, free: NDArray[np.bool_], distance: float) -> float:
         """Return the mean speed ∫|v|·|dx| / ∫|dx| where the stem is `free`, m/s.
 
-        The speed of each move is measured over the shortest time in which the move surely exceeds
+        The speed of each move is measured over the shortest time in which the move clearly exceeds
         the noise: a jump from sample to sample, a slow ramp over many samples. Pieces of the record
         without such a move are joined in pairs until they have one. The rest of the `distance` of
         all strokes, m, is near their ends: it is taken to be half as fast.
@@ -233,7 +233,7 @@ class _Path(NamedTuple):
 class Averages(NamedTuple):
     """Averages of a record for a regression at one averaging time, in two halves where possible.
 
-    `taken` are the indices of the averages of a stem that surely slides; `is_free` says where it is
+    `taken` are the indices of the averages of a clearly sliding stem; `is_free` says where it is
     away from the stops and from both ends of the record. `path` is the path of the averages there,
     and `finest` that of averages as short as noise allows.
     """
@@ -268,7 +268,7 @@ class Averages(NamedTuple):
 def averages_of(
     force: MeasuredSignal, stem: MeasuredSignal, valve: Valve, averaging_time: float
 ) -> Averages | None:
-    """Average a record; None where too few averages are of a stem that surely slides."""
+    """Average a record; None where too few averages are of a stem that clearly slides."""
     begin, end = max(force.time[0], stem.time[0]), min(force.time[-1], stem.time[-1])
     step = max(min(force.period, stem.period), averaging_time / 24.0)
     time = np.arange(begin, end, step)

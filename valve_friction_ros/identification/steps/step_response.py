@@ -46,7 +46,7 @@ _LEVEL_SAMPLES = 10
 """Samples of a level. Chosen: their mean has a third of the noise of one sample."""
 
 _JUMP_SAMPLES = 3
-"""Samples within which a command has jumped. Chosen: three in a row are no single glitch."""
+"""Samples within which a command has jumped. Chosen: three in a row are not a single glitch."""
 
 _JUMP_SHARE = 0.9
 """Share of the change that these samples hold in a jump. Chosen: a lag of 30 samples reaches

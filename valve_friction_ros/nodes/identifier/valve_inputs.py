@@ -74,8 +74,9 @@ class _Input(PolledSubscription):
         found = self._node.get_publishers_info_by_topic(self.topic)
         nodes = {f"{one.node_namespace.rstrip('/')}/{one.node_name}" for one in found}
         return (
-            f"{count} publishers send {self.topic} at once, of {' and '.join(sorted(nodes))}: "
-            "end all but one, or give the others topics of their own"
+            f"{count} publishers send {self.topic} at the same time, from "
+            f"{' and '.join(sorted(nodes))}: stop all but one, or give the others topics of their "
+            "own"
         )
 
     def follow(self) -> None:

@@ -115,7 +115,7 @@ def _one(names: list[str], kind: str, option: str) -> str | None:
     """Choose one of the topics of a type in a namespace."""
     own = [name for name in names if name.rpartition("/")[2] == _OWN_NAMES[kind]]
     if len(names) > 1 and len(own) != 1:
-        raise ValueError(f"several {kind} topics ({', '.join(names)}): choose one by {option}")
+        raise ValueError(f"several {kind} topics ({', '.join(names)}): choose one with {option}")
     return next(iter(own or names), None)
 
 
@@ -163,8 +163,8 @@ def valves_in(topics: Collection[Topic], choice: TopicChoice) -> list[ValveTopic
     if all(valve.missing for valve in valves):
         streams = [topic for topic in topics if topic.type in (PRESSURE_TYPE, STEM_TYPE)]
         raise ValueError(
-            f"no namespace holds both a pressure and a stem, of {_listed(streams)}: "
-            "choose them by --pressure-topic and --stem-topic"
+            f"no namespace holds both a pressure and a stem, of {_listed(streams)}: choose them "
+            "with --pressure-topic and --stem-topic"
         )
     valves = [valve for valve in valves if _is_a_valve(valve)]
     if choice.valve is None:

@@ -136,7 +136,7 @@ def write_bag(
     if stamps.size == 0:
         raise RefusalError("the buffer is empty: there is nothing to save")
     if np.abs(stamps).max() > _LARGEST_STAMP:
-        raise RefusalError("there are stamps after the year 2038, which no header can hold")
+        raise RefusalError("there are stamps after the year 2038, which no message header can hold")
     folder.mkdir(parents=True, exist_ok=True)
     workplace = Path(tempfile.mkdtemp(prefix=".saving_", dir=folder))
     try:
