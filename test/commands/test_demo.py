@@ -340,7 +340,7 @@ def test_the_whole_story(ros_environment, tmp_path):
     grown = (606.0 + 44800.0 * 1e-3 * speed) / (152.7 + 4865.0 * 1e-3 * speed)
     assert low < ratio < high
     assert ratio == pytest.approx(grown, rel=0.06)  # tight, it is slower, and may have fallen
-    assert "outside the tolerance" not in words
+    assert "outside tolerance" not in words
     assert output.read_bytes().startswith(PNG)
 
 

@@ -255,5 +255,5 @@ def test_at_least_a_week_is_on_the_axis(count, shown):
 
 
 def test_nothing_to_draw():
-    with pytest.raises(ValueError, match="not watched"):
+    with pytest.raises(ValueError, match="not monitored"):
         usage_figure(ValveUsage())

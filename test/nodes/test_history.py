@@ -224,9 +224,10 @@ def test_without_a_server_it_starts_and_says_so(live, history, database, postgre
     history.set_baseline(VALVE, KeptBaseline(Baseline(152.7, 1.0), START, START))
     postgres.stop()
     try:
-        live.start_identifier({"history_url": database.url})
+        node = live.start_identifier({"history_url": database.url})
         values = live.client.status_values(what="the first diagnostic")
         assert str(database) in values["history_server not taken"]
+        assert f"at its next start: {values['history_server not taken']}" in node.errors
         assert float(values["baseline_coulomb_friction [N]"]) == 152.7
     finally:
         postgres.start()

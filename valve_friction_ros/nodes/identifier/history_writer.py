@@ -284,7 +284,7 @@ class HistoryWriter:
         if self._untaken is not None:
             self._node.get_logger().warning(
                 "data that another machine may have stored for this valve was not read from the "
-                "server; the node tries again at its next start: {self._untaken}"
+                f"server; the node tries again at its next start: {self._untaken}"
             )
         self.baseline = last = self.look_up(lambda file, name: file.baseline(name))
         if last is not None:
