@@ -19,8 +19,8 @@ import time
 from datetime import datetime, timedelta, timezone
 from functools import partial
 
+import processes
 import pytest
-import waiting
 from webhook_server import (
     Receiver,
     answer_for_ever,
@@ -189,7 +189,7 @@ def alert(message="", new=Level.WARN):
     return Alert("FV-101", "/fv_101/identifier", Level.OK, new, "M", message)
 
 
-wait_until = partial(waiting.wait_until, patience=PATIENCE)
+wait_until = partial(processes.wait_until, patience=PATIENCE)
 
 
 def failure(url, limit=LIMIT):

@@ -12,13 +12,12 @@
 import doctest
 import json
 import math
-import subprocess
-import sys
 from dataclasses import replace
 from importlib import import_module
 
 import numpy as np
 import pytest
+from processes import printed
 
 import valve_friction_ros as vf
 
@@ -48,10 +47,7 @@ def test_some_fifteen_names():
 
 def test_nothing_is_loaded_before_it_is_used():
     code = "import sys, valve_friction_ros; print(*sys.modules)"
-    run = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=300
-    )
-    loaded = run.stdout.split()
+    loaded = printed("-c", code).split()
     assert [name for name in loaded if name.startswith("valve_friction_ros")] == [
         "valve_friction_ros.on_demand",
         "valve_friction_ros",

@@ -12,12 +12,11 @@
 import ast
 import importlib
 import inspect
-import subprocess
-import sys
 from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
+from processes import printed
 
 PACKAGE = "valve_friction_ros"
 SOURCES = Path(__file__).resolve().parents[1] / PACKAGE
@@ -188,15 +187,8 @@ def test_importing_the_core_loads_no_ros():
     """One process loads room after room, and says what it has loaded after each."""
     code = f"import sys, importlib\nfor room in {CORE}:\n"
     code += f"    importlib.import_module('{PACKAGE}.' + room); print(room, *sys.modules)"
-    done = subprocess.run(
-        [sys.executable, "-c", code],
-        cwd=SOURCES.parent,
-        capture_output=True,
-        text=True,
-        check=True,
-        timeout=300,
-    )
-    loaded = {line.split()[0]: line.split()[1:] for line in done.stdout.splitlines()}
+    lines = printed("-c", code, cwd=SOURCES.parent).splitlines()
+    loaded = {line.split()[0]: line.split()[1:] for line in lines}
     assert [*loaded] == CORE
     for room, names in loaded.items():
         assert f"{PACKAGE}.{room}" in names

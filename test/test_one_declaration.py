@@ -11,14 +11,13 @@
 
 import math
 import os
-import subprocess
-import sys
 from dataclasses import fields, replace
 from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
 import pytest
+from processes import printed
 
 from valve_friction_ros import settings
 from valve_friction_ros.figures import save_picture
@@ -108,15 +107,7 @@ def test_a_new_setting_is_one_line(tmp_path):
     place = tmp_path / "settings.py"
     place.write_text(source.replace(BEFORE, ADDED + BEFORE), encoding="utf-8")
     paths = os.pathsep.join([str(PROJECT), str(PROJECT / "doc")])
-    done = subprocess.run(
-        [sys.executable, "-c", USE, place],
-        env=os.environ | {"PYTHONPATH": paths},
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=300,
-    )
-    assert done.returncode == 0, done.stderr
+    printed("-c", USE, place, env=os.environ | {"PYTHONPATH": paths})
 
 
 @pytest.mark.parametrize("node", NODES)

@@ -29,7 +29,7 @@ import pytest
 import rclpy
 import yaml
 from documentation import TEXT
-from waiting import PATIENCE
+from processes import PATIENCE, printed
 
 from valve_friction_ros import __version__
 
@@ -470,15 +470,8 @@ def test_node_from_the_installed_tree(installed, observer, tmp_path):
         "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
         "ROS_LOG_DIR": str(tmp_path / "log"),
     }
-    where = subprocess.run(
-        [sys.executable, "-c", f"import {NAME}; print({NAME}.__file__)"],
-        cwd=tmp_path,
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert Path(where.stdout.strip()).is_relative_to(library)
+    where = printed("-c", f"import {NAME}; print({NAME}.__file__)", cwd=tmp_path, env=environment)
+    assert Path(where.strip()).is_relative_to(library)
 
     output = tmp_path / "output.txt"
     command = [installed / "lib" / NAME / "identifier", "--ros-args", "-r", "__ns:=/fv_101"]

@@ -21,9 +21,8 @@ import time
 from pathlib import Path
 
 import pytest
-from processes import ran
+from processes import ran, wait_until
 from rich.console import Console
-from waiting import wait_until
 
 from valve_friction_ros.commands.demo import command as demo
 from valve_friction_ros.commands.demo import plant

@@ -21,8 +21,7 @@ from dask_workers import identify, local_cluster
 from documentation import PROJECT
 from kept_rows import kept, rows_of
 from local_server import certificate_pair
-from processes import ran
-from waiting import PATIENCE, wait_until
+from processes import PATIENCE, ran, wait_until
 
 from valve_friction_ros.commands import identify_folder
 from valve_friction_ros.fleet import workers

@@ -25,7 +25,7 @@ import numpy as np
 import pytest
 from bags import messages_of, write_bag
 from kept_rows import csv_rows, kept, rows_of
-from waiting import PATIENCE, wait_until
+from processes import PATIENCE, wait_until
 
 from valve_friction_ros.commands.main import run as run_here
 from valve_friction_ros.identification import IdentificationSettings, identify_bench

@@ -21,6 +21,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from processes import ran
 
 from valve_friction_ros import __version__
 from valve_friction_ros.commands.arguments import add_options, percent
@@ -279,11 +280,10 @@ TEXT = """
 @pytest.mark.parametrize("command", [["demo"], ["call", "/fv_101", "identify"]])
 def test_without_ros_one_line_says_so(command):
     code = "import sys; sys.modules['rclpy'] = None; from valve_friction_ros.commands.main import *"
-    run = [sys.executable, "-c", f"{code}; sys.exit(run({command}))"]
-    ran = subprocess.run(run, check=False, capture_output=True, text=True, timeout=300)
-    assert ran.returncode == 2
+    ended, _, error = ran(program=("-c", f"{code}; sys.exit(run({command}))"))
+    assert ended == 2
     told = rf"valve_friction {command[0]}: ROS 2 is needed \(.*rclpy.*\): source it, or .*\n"
-    assert re.fullmatch(told, ran.stderr)
+    assert re.fullmatch(told, error)
 
 
 def test_options_from_their_help():

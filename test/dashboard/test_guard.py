@@ -28,8 +28,8 @@ from typing import NamedTuple
 import pytest
 from browser import axe_violations, chromium
 from local_server import certificate_pair, free_port
+from processes import PATIENCE, wait_until
 from quick_accounts import PASSWORD, quick_account
-from waiting import PATIENCE, wait_until
 
 from valve_friction_ros.dashboard.accounts import VARIABLE, Access, Role
 from valve_friction_ros.dashboard.log_in import Sessions
@@ -551,7 +551,7 @@ def test_1100_half_requests_do_not_take_the_pages(page, opened, source):
     assert page.opens()
     lines = [line for line in page.output.read_text().splitlines() if source in line]
     assert 1 <= len(lines) <= 60
-    assert set(lines) == {f"a connection of {source} was ended: more than 256 were open"}
+    assert set(lines) == {f"a connection of {source} was closed: more than 256 were open"}
 
 
 def time_until_the_end(made, slowly):
@@ -575,7 +575,7 @@ def test_half_a_request_ends_after_ten_seconds(page, opened, sent, slowly):
     """Without a byte, as browsers do, which is not logged; within the headers, slow ones too."""
     made = opened(page.connect("127.0.0.2", sent))
     assert 0.9 * ARRIVAL_TIME < time_until_the_end(made, slowly) < 2 * ARRIVAL_TIME
-    told = "a connection of 127.0.0.2 was ended: its request did not arrive within 10 s"
+    told = "a connection of 127.0.0.2 was closed: its request did not arrive within 10 s"
     assert (told in page.output.read_text()) is bool(sent)
 
 

@@ -11,8 +11,6 @@
 
 import math
 import signal
-import subprocess
-import sys
 import threading
 import time
 from pathlib import Path
@@ -33,7 +31,7 @@ from histories import (
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from local_server import database_of, sending
-from waiting import wait_until
+from processes import printed, wait_until
 from writers import writer
 
 from valve_friction_ros.health import Baseline, Level, Measured
@@ -360,14 +358,8 @@ class TestAnotherMachine:
                 "print(sender.take(KeptValve('/fv_9/identifier', 'FV-9')))\n"
                 "print(sender.state.is_sending); sender.end()\n"
             )
-            done = subprocess.run(
-                [sys.executable, "-c", code, history.path, database.url, str(PROJECT)],
-                capture_output=True,
-                text=True,
-                check=True,
-                timeout=300,
-            )
-            assert done.stdout.split() == ["None", "False"]
+            found = printed("-c", code, history.path, database.url, PROJECT)
+            assert found.split() == ["None", "False"]
             assert sender_of(history.path, database) is sender
             sender.end()
             assert sender.state.is_sending
@@ -448,7 +440,7 @@ def test_a_row_that_was_changed_there_is_told(full, tmp_path):
 
 
 def test_ends_that_cannot_be(full, tmp_path):
-    with pytest.raises(HistoryError, match="both ends"):
+    with pytest.raises(HistoryError, match="both source and target"):
         copied(full.path, full.path)
     with pytest.raises(HistoryError, match="there is no such file"):
         copied(tmp_path / "none.sqlite", full.path)

@@ -11,7 +11,6 @@
 
 import os
 import re
-import subprocess
 import sys
 from contextlib import contextmanager
 from pathlib import Path
@@ -21,7 +20,7 @@ import sqlalchemy as sa
 from full_history import all_of, fill, filled
 from histories import START, VALVE, make_version, select, success
 from local_server import certificate_pair, database_of, sending
-from waiting import wait_until
+from processes import printed, wait_until
 
 from valve_friction_ros.history import (
     History,
@@ -245,15 +244,7 @@ def test_without_a_server_its_library_is_not_loaded(tmp_path):
         f"h.HistoryFile(Path({str(tmp_path / 'h.sqlite')!r})).prepare(); "
         "print('psycopg' in sys.modules)"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", code],
-        cwd=PROJECT,
-        capture_output=True,
-        text=True,
-        check=True,
-        timeout=300,
-    )
-    assert done.stdout == "False\n"
+    assert printed("-c", code, cwd=PROJECT) == "False\n"
 
 
 def test_without_its_library_one_line_says_so(monkeypatch):

@@ -19,6 +19,7 @@ from pathlib import Path
 
 import pytest
 from histories import START, change, select, success
+from processes import printed
 from writers import writer
 
 from valve_friction_ros.history import HistoryError, HistoryFile, database, tables
@@ -98,15 +99,7 @@ history.add(success(START))
 
 def printed_by(program, path):
     """Run a program, given a path and the folders of its modules; what it prints."""
-    run = subprocess.run(
-        [sys.executable, "-c", program, str(path), *map(str, FOLDERS)],
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=False,
-    )
-    assert run.returncode == 0, run.stderr
-    return run.stdout
+    return printed("-c", program, path, *FOLDERS)
 
 
 def test_a_file_that_may_not_grow(history):
@@ -155,7 +148,7 @@ def test_read_only_folder():
         folder.chmod(0o755)
     count, old, new = told.splitlines()
     assert count == "1"
-    assert "readonly database: make the file and its folder writable, or name another" in old
+    assert "readonly database: make the file and its folder writable, or use another" in old
     assert "unable to open database file: check that the folder exists and is writable" in new
 
 

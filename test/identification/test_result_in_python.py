@@ -12,12 +12,11 @@
 import copy
 import math
 import pickle
-import subprocess
-import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from processes import printed
 from records import quick_record, simulated
 from scipy.signal import lfilter
 
@@ -218,7 +217,4 @@ def test_another_process_reads_it_by_pickle_alone(results, tmp_path):
     place = tmp_path / "result.pickle"
     place.write_bytes(pickle.dumps(results["plant"]))
     told = "import pickle, sys; print(repr(pickle.load(open(sys.argv[1], 'rb'))))"
-    found = subprocess.run(
-        [sys.executable, "-c", told, str(place)], capture_output=True, text=True, check=True
-    )
-    assert found.stdout.strip() == repr(results["plant"])
+    assert printed("-c", told, place).strip() == repr(results["plant"])

@@ -10,10 +10,9 @@
 """Kernels are compiled anew when they must be, and run where nothing can be cached."""
 
 import os
-import subprocess
-import sys
 
 import pytest
+from processes import printed
 
 INNER = """
 from valve_friction_ros.model.compiled import compiled
@@ -52,16 +51,7 @@ def kernels(tmp_path):
 def told(folder, *words, **variables):
     """What a new process of Python prints."""
     environment = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
-    found = subprocess.run(
-        [sys.executable, "-B", *words],
-        cwd=folder,
-        env=environment | variables,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert found.returncode == 0, found.stderr
-    return found.stdout
+    return printed("-B", *words, cwd=folder, env=environment | variables)
 
 
 def run(folder, **variables):

@@ -297,7 +297,7 @@ def test_keys_of_experts_are_folded_away_and_opened_by_the_keyboard(tab):
     folds = page.locator(".vf-valve details")
     folds.nth(1).wait_for()
     names = folds.locator("summary").all_inner_texts()
-    assert names == ["For experts: fit of the model", "For experts: node and samples"]
+    assert names == ["For experts: model fit", "For experts: node and samples"]
     key = folds.nth(1).get_by_text("buffered samples", exact=True)
     key.wait_for(state="hidden")
     folds.nth(1).locator("summary").focus()

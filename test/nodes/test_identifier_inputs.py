@@ -15,12 +15,12 @@ import itertools
 import numpy as np
 import pytest
 from live_nodes import NAMESPACE, OK, START, STREAM, WARN, stamps_of, values_of
+from processes import PATIENCE
 from rclpy.duration import Duration
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from records import quick_record
 from sensor_msgs.msg import FluidPressure, JointState
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension, MultiArrayLayout, String
-from waiting import PATIENCE
 
 from valve_friction_ros.identification import identify
 from valve_friction_ros.model import BENCH_VALVE

@@ -16,7 +16,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from histories import VALVE
-from live_nodes import NAMESPACE, NODE, OK, SECOND, START, STREAM, WARN, command, time_of, values_of
+from live_nodes import NAMESPACE, NODE, OK, PROJECT, SECOND, START, STREAM, WARN, time_of, values_of
+from processes import ran
 from rclpy.duration import Duration
 from records import quick_record
 from sensor_msgs.msg import JointState
@@ -365,8 +366,8 @@ def test_the_figures_outlive_a_kill(live, history):
     page = Path(client.trigger("report").message).read_text(encoding="utf-8")
     assert "Response to the command" in page
     assert "latest 6 steps of stem_command, from 2023-11-14 22:13 to 2023-11-14 22:14" in page
-    shown = command("history", history.path)
-    assert "stem_command: 6 steps, 0 ignored; medians: dead time 1" in shown.stdout, shown.stderr
+    _, shown, error = ran("history", history.path, cwd=PROJECT)
+    assert "stem_command: 6 steps, 0 ignored; medians: dead time 1" in shown, error
     assert client.trigger("reset_usage").success
     client.status_values(lambda one: values_of(one)["moves"] == "0", "a new packing")
     assert client.next_status().level == OK

@@ -15,8 +15,8 @@ import pytest
 import rclpy
 from histories import START, success
 from live_nodes import OK, STREAM, WARN, values_of
+from processes import PATIENCE
 from sensor_msgs.msg import FluidPressure, JointState
-from waiting import PATIENCE
 
 from benchmark.soak_plant import PERIOD, TOLD_WITHIN, Nonsense, said
 from valve_friction_ros.health import Baseline

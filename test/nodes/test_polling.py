@@ -13,10 +13,11 @@ import time
 from types import SimpleNamespace
 
 import numpy as np
+import processes
 import pytest
 import rclpy
-import waiting
 from live_nodes import SECOND, Client, Domain, time_of
+from processes import PATIENCE
 from rclpy.duration import Duration
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.experimental import EventsExecutor
@@ -24,7 +25,6 @@ from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import FluidPressure, JointState
 from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
-from waiting import PATIENCE
 
 from valve_friction_ros.nodes.identifier.valve_inputs import ValveInputs, _Input
 from valve_friction_ros.nodes.plumbing.polled_node import PolledNode, TurnExecutor, create_service
@@ -52,7 +52,7 @@ def bench():
 
 
 def wait_until(condition, what):
-    return waiting.wait_until(condition, lambda: what)
+    return processes.wait_until(condition, lambda: what)
 
 
 def sender(client, polled):

@@ -22,7 +22,8 @@ import numpy as np
 import pytest
 import yaml
 from faulty_identifier import FINISH, FULL, SLOW, faulty
-from live_nodes import NAMESPACE, NODE, SECOND, STREAM, SimulatedClock, command, stamp_of, stamps_of
+from live_nodes import NAMESPACE, NODE, PROJECT, SECOND, STREAM, SimulatedClock, stamp_of, stamps_of
+from processes import ran
 from rclpy.duration import Duration
 from records import quick_record
 from rosbags.rosbag2 import Reader
@@ -48,9 +49,9 @@ class Run(NamedTuple):
 
 def identified(*arguments):
     """The one JSON object of the command, run as a person would."""
-    done = command("identify", "--json", *arguments)
-    assert (done.returncode, done.stderr) == (0, "")
-    return json.loads(done.stdout)
+    done = ran("identify", "--json", *arguments, cwd=PROJECT)
+    assert done[::2] == (0, "")
+    return json.loads(done[1])
 
 
 def numbers_of(answer):

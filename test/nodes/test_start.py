@@ -20,6 +20,7 @@ import pytest
 import yaml
 from live_nodes import NAMESPACE, NODE, PROJECT, Domain, NodeProcess, values_of
 from local_server import free_port
+from processes import ran
 
 from valve_friction_ros.records.files import data_folder
 
@@ -271,17 +272,9 @@ def test_diagnostics_say_that_it_prepares(live, tmp_path):
 def python(code, *arguments, **environment):
     """What a Python of its own prints."""
     bare = {key: value for key, value in os.environ.items() if key != "OPENBLAS_NUM_THREADS"}
-    done = subprocess.run(
-        [sys.executable, "-c", code, *arguments],
-        cwd=PROJECT,
-        env=bare | environment,
-        capture_output=True,
-        text=True,
-        check=True,
-        timeout=300,
-    )
-    assert done.stderr == ""
-    return done.stdout
+    done = ran(*arguments, program=("-c", code), cwd=PROJECT, env=bare | environment)
+    assert done[::2] == (0, "")
+    return done[1]
 
 
 @pytest.mark.parametrize("given", ["-p", "fv_101", "--params-file"])
@@ -292,11 +285,9 @@ def test_arguments_that_ros_does_not_read_are_refused(given):
         "assert start.identifier() == 2"
     )
     told = f"cannot start: '{given}' is not a ROS argument: write --ros-args before "
-    done = subprocess.run(
-        [sys.executable, "-c", code, given, "travel:=0.03"],
-        cwd=PROJECT, capture_output=True, text=True, timeout=100, check=True,
-    )  # fmt: skip
-    assert done.stderr.startswith(told)
+    ended, _, error = ran(given, "travel:=0.03", program=("-c", code), cwd=PROJECT)
+    assert ended == 0
+    assert error.startswith(told)
 
 
 HELP = """

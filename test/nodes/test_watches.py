@@ -22,11 +22,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from histories import VALVE
+from processes import PATIENCE, wait_until
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 from service import SECOND, START, made_moves
 from service import VALVE as BUILT
-from waiting import PATIENCE, wait_until
 
 from valve_friction_ros.dashboard.live_state import Sources
 from valve_friction_ros.evidence import Move

@@ -14,7 +14,8 @@ import re
 
 import numpy as np
 import pytest
-from live_nodes import PROJECT, command
+from live_nodes import PROJECT
+from processes import ran
 
 LIBRARIES = ("apsw", "backports", "lz4", "rosbags")
 LINE = re.compile(
@@ -54,13 +55,13 @@ def test_csv_is_identified_and_a_bag_is_refused(loose_record, bench_yaml, tmp_pa
     file = tmp_path / "record.csv"
     np.savetxt(file, columns, "%.12g", ",", header="time_s,pressure_pa,position_m", comments="")
     options = ("--valve", bench_yaml, "--method", "published")
-    done = command("identify", file, *options)
-    assert done.returncode == 0, done.stderr
+    code, _, error = ran("identify", file, *options, cwd=PROJECT)
+    assert code == 0, error
     bag = tmp_path / "bag.mcap"
     bag.write_bytes(b"\x89MCAP0\r\n")
-    done = command("identify", bag, *options)
-    assert done.returncode == 2
-    assert LINE.fullmatch(done.stderr.strip().removeprefix("valve_friction identify: "))
+    code, _, error = ran("identify", bag, *options, cwd=PROJECT)
+    assert code == 2
+    assert LINE.fullmatch(error.strip().removeprefix("valve_friction identify: "))
 
 
 def test_a_folder_tells_which_are_bags(bench_yaml, tmp_path):
@@ -68,6 +69,7 @@ def test_a_folder_tells_which_are_bags(bench_yaml, tmp_path):
     folder.mkdir()
     (folder / "bag.mcap").write_bytes(b"\x89MCAP0\r\n")
     output = tmp_path / "rows.csv"
-    done = command("identify-folder", folder, "--valve", bench_yaml, "--output", output)
-    assert done.returncode == 2, done.stderr
+    options = ("--valve", bench_yaml, "--output", output)
+    code, _, error = ran("identify-folder", folder, *options, cwd=PROJECT)
+    assert code == 2, error
     assert LINE.search(output.read_text())

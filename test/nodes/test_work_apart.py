@@ -19,7 +19,7 @@ import time
 from pathlib import Path
 
 import pytest
-from waiting import PATIENCE, wait_until
+from processes import PATIENCE, wait_until
 
 from valve_friction_ros.health import (
     RefusedRecordError,

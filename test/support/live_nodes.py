@@ -21,6 +21,7 @@ import numpy as np
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray
 from extension.diagnostic_keys import is_explained
+from processes import PATIENCE
 from rcl_interfaces.srv import (
     DescribeParameters,
     GetParameters,
@@ -35,7 +36,6 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import FluidPressure, JointState
 from std_msgs.msg import Float64, Float64MultiArray
 from std_srvs.srv import Trigger
-from waiting import PATIENCE
 
 from benchmark.harness.processes import parameters as as_arguments
 from benchmark.harness.run import Participant
@@ -456,18 +456,6 @@ class Client(Participant):
         request = SetParametersAtomically.Request(parameters=_parameter_messages(values))
         name = f"{node}/set_parameters_atomically"
         return self.call(SetParametersAtomically, name, request).result
-
-
-def command(*arguments):
-    """Run the command as a person would; how it ended, and what it said."""
-    return subprocess.run(
-        [sys.executable, "-m", "valve_friction_ros", *map(str, arguments)],
-        cwd=PROJECT,
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=False,
-    )
 
 
 class SimulatedClock:

@@ -7,16 +7,30 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Processes that tests have started, found by their environment; and commands run to their end."""
+"""Processes of tests: run to their end, found by their environment, waited for."""
 
 import contextlib
 import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 MARK = "VALVE_FRICTION_TESTS"
 """Environment variable of all that a test starts: the process that runs the test."""
+
+
+PATIENCE = 120.0
+"""Time for one thing to happen on a slow and loaded machine, s."""
+
+
+def wait_until(condition, told=lambda: "", patience=PATIENCE, turn=0.01):
+    """Look until `condition()` is true, and return it; fail with what is `told` at the end."""
+    deadline = time.monotonic() + patience
+    while not (met := condition()):
+        assert time.monotonic() < deadline, f"not within {patience:g} s: {told()}"
+        time.sleep(turn)
+    return met
 
 
 def ran(*arguments, program=("-m", "valve_friction_ros"), **options):
@@ -25,6 +39,13 @@ def ran(*arguments, program=("-m", "valve_friction_ros"), **options):
     usual = {"capture_output": True, "text": True, "timeout": 300}
     done = subprocess.run(words, check=False, **(usual | options))
     return done.returncode, done.stdout, done.stderr
+
+
+def printed(*program, **options):
+    """What Python prints of a program, which must end well."""
+    code, out, error = ran(program=program, **options)
+    assert code == 0, error
+    return out
 
 
 def processes_with(words):

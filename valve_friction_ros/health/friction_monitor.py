@@ -68,8 +68,8 @@ def followed(
 ) -> StandingAlarm | None:
     """Return what remains of an alarm after the next record, whose own diagnosis is `latest`.
 
-    It is the same alarm if that record leaves its level possible; a WARN if it clearly clears the
-    ERROR but not the WARN; None if it clearly clears both, or raises as severe an alarm itself.
+    It is the same alarm if that record leaves its level possible; a WARN if it rules out the
+    ERROR but not the WARN; None if it rules out both, or raises as severe an alarm itself.
     """
     side = alarm.state.side
     if side is None:

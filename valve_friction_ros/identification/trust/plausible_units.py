@@ -123,17 +123,13 @@ def require_plausible_units(
             + position_question(place, _TRAVEL.ordinary[1])
         )
     if len(recording) > _LEAST_SAMPLES:
-        is_dated = recording.start_time > _DATED
-        speed, constant = (
-            _top_speed(recording),
-            0.0 if is_dated else _least_time_constant(recording),
-        )
-        for problem in (
-            _beyond("the stem moves at", speed, _SPEED._replace(possible=(0.0, _TRIP_SPEED))),
-            _beyond("the stem lags behind the pressure by", constant, _TIME_CONSTANT),
-        ):
-            if problem:
-                raise RefusalError(problem)
+        speed = _SPEED._replace(possible=(0.0, _TRIP_SPEED))
+        problem = _beyond("the stem moves at", _top_speed(recording), speed)
+        if not problem and recording.start_time <= _DATED:
+            late = _least_time_constant(recording)
+            problem = _beyond("the stem lags behind the pressure by", late, _TIME_CONSTANT)
+        if problem:
+            raise RefusalError(problem)
 
 
 def require_valve_units(valve: Valve, known: Mapping[str, float]) -> None:
