@@ -33,11 +33,15 @@ from valve_friction_ros.identification.engine.friction_curve import (
 from valve_friction_ros.identification.engine.intervals import Estimated
 from valve_friction_ros.identification.engine.lags import LagPrior
 from valve_friction_ros.identification.engine.sliding_averages import (
+    WORK_LAGS,
     MeasuredSignal,
+    Work,
     _lengths,
     _Path,
     _path,
     averaged_twice,
+    averages_of,
+    force_and_stem,
     turns_of,
 )
 from valve_friction_ros.identification.engine.verdicts import curve_verdicts
@@ -523,6 +527,25 @@ class TestMeanSpeed:
         usual = self.of(time, position, 19 * 5e-3)
         time[100] = time[99] + apart
         assert self.of(time, position, 19 * 5e-3) == pytest.approx(usual, rel=0.1)
+
+
+@pytest.mark.parametrize("slower", [1, 10])
+def test_noise_of_the_force_in_its_work(slower):
+    """A pressure that is sampled ten times as slowly has its noise in ten times as many moves."""
+    time = np.arange(0.0, 40.0, 0.005)
+    stem = StampedSignal(time, 0.01 * np.sin(0.5 * math.pi * time))
+    force, deviation = 80.0 * np.cos(0.5 * math.pi * time)[::slower], 4.0
+
+    def work(noise, seed):
+        white = noise * np.random.default_rng(seed).standard_normal(force.size)
+        drive = StampedSignal(time[::slower], force + white)
+        signals = force_and_stem(StampedRecord(drive, stem, Drive.FORCE), Valve())
+        return Work.of(*signals, averages_of(*signals, Valve(), 0.12))
+
+    found = [work(deviation, seed) for seed in range(30)]
+    scatter = np.std([np.interp(0.0, WORK_LAGS, one.by_lag) for one in found])
+    foreseen = np.median([one.noise for one in found]) ** 2 - work(0.0, 0).noise ** 2
+    assert math.sqrt(foreseen) == pytest.approx(scatter, rel=0.3)
 
 
 class TestConverterOfTheForce:

@@ -179,6 +179,23 @@ def test_the_interval_holds_the_truth(seed):
     assert abs(one.value - FRICTION) <= one.half_width < 0.5 * FRICTION
 
 
+def test_noise_of_a_resting_stem_is_no_part_of_a_stroke():
+    """Strokes end at extremes of that noise, when the force is that of the rest."""
+    noise = (10.0, 4e-5)
+    found = [forces(*jumping(12, rest=4.0, noise=noise, seed=n), noise=noise) for n in range(6)]
+    values = [one.numbers[SLIDING].value for one in found]
+    assert np.mean(values) == pytest.approx(FRICTION, rel=0.07)
+
+
+def test_noise_that_averages_remove_widens_nothing():
+    """The strokes of a noisy stem are averaged over many samples, and so is the force."""
+    quiet, noisy = (
+        forces(*jumping(12, noise=noise), noise=noise).numbers[SLIDING]
+        for noise in ((0.0, 2e-5), (10.0, 2e-5))
+    )
+    assert noisy.half_width < quiet.half_width + 0.02 * FRICTION
+
+
 def test_a_lag_that_nobody_stated_widens_it():
     known = forces(*jumping(12)).numbers[SLIDING]
     open_ = forces(*jumping(12), lag=LagPrior()).numbers[SLIDING]

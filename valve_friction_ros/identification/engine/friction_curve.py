@@ -271,9 +271,10 @@ def _by_strokes(
         return None
     grid, halves = quiet_grid(stem, between, _LONGEST)
     step = float(grid[1] - grid[0])
-    position, pressed = (np.mean(one, axis=0) for one in (halves, force.halves(grid)))
+    # The ends of a stroke are extremes of the noise of one half: the other half is free of them.
+    position, pressed = halves[1], np.mean(force.halves(grid), axis=0)
     turns = turns_of(halves[0], least_stroke(halves[0], stem.noise))
-    turns = _cut(position, turns, math.ceil(_PIECES / max(turns.size - 1, 1)))
+    turns = _cut(halves[0], turns, math.ceil(_PIECES / max(turns.size - 1, 1)))
     moves = np.gradient(position) * away_from_stops(position, valve)
     way = np.add.reduceat(moves, turns[:-1])
     is_free = np.abs(way) > 0.0
@@ -308,10 +309,9 @@ def _by_strokes(
     distance = float(np.sum(np.abs(way)))
     along = moves / distance
     rounding = work_of_rounding(force, grid, along)
-    noise = force.noise * math.sqrt(step / force.period * float(along @ along))
     of_record = math.hypot(
         half_width(math.sqrt(float(covariance[0, 0])), freedom),
-        NORMAL_QUANTILE * math.hypot(noise, rounding, _unseen_between(pressed, position, way)),
+        NORMAL_QUANTILE * math.hypot(rounding, _unseen_between(pressed, position, way)),
     )
     timing = of_lag / NORMAL_QUANTILE
     sources = {ROUNDING: rounding} if rounding > 0.0 else {}
@@ -343,14 +343,15 @@ def _unseen_between(force: _Array, position: _Array, way: _Array) -> float:
     """Return the deviation of the friction due to events between two points of the grid, N.
 
     Where the stem jumps from one point to the next, a force that jumps too may do so before or
-    after it, and in all jumps alike. A force that changes as before and after leaves nothing open.
-    `way` is the length of each stroke, m.
+    after it, and one that turns there is blunted by the averages, in all jumps alike. A force that
+    changes as before and after leaves nothing open. `way` is the length of each stroke, m.
     """
     moves = np.abs(np.diff(position))
     jumps = np.flatnonzero(moves > _JUMP * np.mean(np.abs(way)))
     before, begin, end, after = force[np.clip(jumps + _NEAR, 0, force.size - 1)]
-    change = np.abs((end - begin) - 0.5 * ((begin - before) + (after - end)))
-    return RECTANGLE * 0.5 * float(moves[jumps] @ change) / float(np.sum(np.abs(way)))
+    rise, fall = begin - before, after - end
+    open_ = np.hypot(end - begin - 0.5 * (rise + fall), 0.5 * (rise - fall))
+    return RECTANGLE * 0.5 * float(moves[jumps] @ open_) / float(np.sum(np.abs(way)))
 
 
 def _cut(position: _Array, turns: NDArray[np.intp], pieces: int) -> NDArray[np.intp]:

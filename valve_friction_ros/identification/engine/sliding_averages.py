@@ -449,8 +449,9 @@ class Work(NamedTuple):
         def by(length: int) -> "Work":
             pressed, position = (averaged_twice(one, length) for one in whole)
             along = np.gradient(position) * is_free / path.distance
-            # Twice averaged noise is that of some samples at a time: as much as of each alone.
-            noise = force.noise * math.sqrt(step / force.period * float(along @ along))
+            # The force between two of its samples has the noise of both.
+            of_samples = np.bincount(np.searchsorted(force.time, time), along)
+            noise = force.noise * float(np.linalg.norm(of_samples))
             return cls(time, pressed, position, along, path.strokes, noise, speed)
 
         work = by(length)
