@@ -30,7 +30,6 @@ from valve_friction_ros.health import (
     Survey,
     by_severity,
     dead_band,
-    dead_band_half_width,
 )
 from valve_friction_ros.history import HistoryEntry, Trend
 from valve_friction_ros.history.status_values import (
@@ -79,10 +78,7 @@ def estimate_status(
     if estimate is not None and monitor.stamp is not None:
         values["estimate_time"] = exact_time(monitor.stamp)
         values["estimate_from"] = "this run" if monitor.earlier is None else "before the restart"
-        valve = monitor.settings.valve
-        values |= result_values(
-            estimate.to_dict(), dead_band(estimate, valve), dead_band_half_width(estimate, valve)
-        )
+        values |= result_values(estimate, monitor.settings.valve)
     values |= baseline_values(monitor.baseline)
     values |= ratio_values(diagnosis.ratio)
     if diagnosis.survey is not Survey.UNKNOWN:
