@@ -29,15 +29,8 @@ from valve_friction_ros.dashboard.live_state import (
     Status,
     Unread,
 )
-from valve_friction_ros.health import (
-    Alarm,
-    AlarmError,
-    AlarmKind,
-    AlarmState,
-    Level,
-    StatusSignal,
-    Survey,
-)
+from valve_friction_ros.health.alarms import Alarm, AlarmError, AlarmKind, AlarmState
+from valve_friction_ros.health.levels import Level, StatusSignal, Survey
 from valve_friction_ros.history import (
     AlarmFilter,
     HistoryError,

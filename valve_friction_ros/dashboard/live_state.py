@@ -19,17 +19,10 @@ from dataclasses import dataclass, field, replace
 from datetime import datetime
 from typing import NamedTuple
 
-from valve_friction_ros.health import (
-    Alarm,
-    AlarmKind,
-    AlarmState,
-    BaselineLack,
-    Condition,
-    Lack,
-    Level,
-    Ratio,
-    StatusSignal,
-)
+from valve_friction_ros.health.alarms import Alarm, AlarmKind, AlarmState, Condition
+from valve_friction_ros.health.baseline import BaselineLack, Lack
+from valve_friction_ros.health.comparison import Ratio
+from valve_friction_ros.health.levels import Level, StatusSignal
 from valve_friction_ros.outside_text import printable
 from valve_friction_ros.wording import name_in_words, number_and_width
 

@@ -39,10 +39,11 @@ from valve_friction_ros.evidence.balance import (
     robust,
 )
 from valve_friction_ros.evidence.moves import Move, Moves
-from valve_friction_ros.identification import TIMING_UNCERTAINTY, IdentificationSettings, Parameter
+from valve_friction_ros.identification.settings import TIMING_UNCERTAINTY, IdentificationSettings
 from valve_friction_ros.identification.trust.uncertainty import MEDIAN_MAGNITUDE
 from valve_friction_ros.identification.trust.verdict import (
     WEAK_SHARE,
+    Parameter,
     Verdict,
     calibrated,
     calibration_share,

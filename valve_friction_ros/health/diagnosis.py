@@ -27,7 +27,10 @@ from valve_friction_ros.health.levels import (
 )
 from valve_friction_ros.health.measured import Measured
 from valve_friction_ros.health.valve_numbers import comparable_numbers
-from valve_friction_ros.identification import SLIDING, Parameter, Result, plain
+from valve_friction_ros.identification.rendering import plain
+from valve_friction_ros.identification.result import Result
+from valve_friction_ros.identification.settings import SLIDING
+from valve_friction_ros.identification.trust.verdict import Parameter
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.wording import Code, Statement, said, sentence
 

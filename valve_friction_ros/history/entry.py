@@ -25,15 +25,11 @@ from valve_friction_ros.health.friction_monitor import FrictionMonitor, MonitorS
 from valve_friction_ros.health.levels import Level
 from valve_friction_ros.health.measured import DatedNumber, Measured
 from valve_friction_ros.health.valve_numbers import RefusedRecordError
-from valve_friction_ros.identification import (
-    SLIDING,
-    Parameter,
-    RefusalError,
-    Result,
-    Verdict,
-    parameter_mapping,
-    plain,
-)
+from valve_friction_ros.identification.refusal import RefusalError
+from valve_friction_ros.identification.rendering import parameter_mapping, plain
+from valve_friction_ros.identification.result import Result
+from valve_friction_ros.identification.settings import SLIDING
+from valve_friction_ros.identification.trust.verdict import Parameter, Verdict
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.streams.record_buffer import Snapshot
 

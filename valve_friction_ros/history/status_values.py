@@ -12,16 +12,10 @@
 import math
 from collections.abc import Mapping
 
-from valve_friction_ros.health import (
-    Alarm,
-    AlarmKind,
-    AlarmState,
-    Baseline,
-    Ratio,
-    dead_band,
-    dead_band_half_width,
-)
-from valve_friction_ros.health.diagnosis import Estimate
+from valve_friction_ros.health.alarms import Alarm, AlarmKind, AlarmState
+from valve_friction_ros.health.baseline import Baseline
+from valve_friction_ros.health.comparison import Ratio
+from valve_friction_ros.health.diagnosis import Estimate, dead_band, dead_band_half_width
 from valve_friction_ros.history.trend import Trend
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.streams import utc, utc_day, utc_second

@@ -34,7 +34,8 @@ from valve_friction_ros.dashboard.pages.theme import (
     text,
 )
 from valve_friction_ros.dashboard.plant_rows import address_of, moment
-from valve_friction_ros.health import (
+from valve_friction_ros.health.alarms import (
+    TRANSITIONS,
     Alarm,
     AlarmAction,
     AlarmError,
@@ -42,7 +43,6 @@ from valve_friction_ros.health import (
     AlarmRequest,
     AlarmState,
 )
-from valve_friction_ros.health.alarms import TRANSITIONS
 from valve_friction_ros.history import AlarmFilter, HistoryError, KeptAlarmEvent
 from valve_friction_ros.outside_text import printable
 from valve_friction_ros.streams import DAY

@@ -60,7 +60,7 @@ from valve_friction_ros.dashboard.plant_rows import (
     state_of,
     state_words,
 )
-from valve_friction_ros.health import Alarm, AlarmEvent
+from valve_friction_ros.health.alarms import Alarm, AlarmEvent
 from valve_friction_ros.history import AlarmFilter, HistoryError, ValveHistory
 from valve_friction_ros.outside_text import printable
 from valve_friction_ros.wording import lack_remedies, name_in_words

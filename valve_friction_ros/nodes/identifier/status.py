@@ -21,16 +21,9 @@ from rclpy.publisher import Publisher
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, Float64MultiArray, MultiArrayDimension, MultiArrayLayout
 
-from valve_friction_ros.health import (
-    Diagnosis,
-    Finding,
-    FrictionMonitor,
-    Level,
-    StatusSignal,
-    Survey,
-    by_severity,
-    dead_band,
-)
+from valve_friction_ros.health.diagnosis import Diagnosis, dead_band
+from valve_friction_ros.health.friction_monitor import FrictionMonitor
+from valve_friction_ros.health.levels import Finding, Level, StatusSignal, Survey, by_severity
 from valve_friction_ros.history import HistoryEntry, Trend
 from valve_friction_ros.history.status_values import (
     baseline_values,
@@ -39,7 +32,9 @@ from valve_friction_ros.history.status_values import (
     result_values,
     trend_values,
 )
-from valve_friction_ros.identification import SLIDING, UNITS, Result, Sweep
+from valve_friction_ros.identification.published.sweep import Sweep
+from valve_friction_ros.identification.result import Result
+from valve_friction_ros.identification.settings import SLIDING, UNITS
 from valve_friction_ros.nodes.plumbing.messages import time_message
 from valve_friction_ros.nodes.plumbing.polled_node import PolledNode
 from valve_friction_ros.nodes.plumbing.qos import LATCHED
