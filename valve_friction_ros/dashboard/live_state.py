@@ -24,6 +24,7 @@ from valve_friction_ros.health.baseline import BaselineLack, Lack
 from valve_friction_ros.health.comparison import Ratio
 from valve_friction_ros.health.levels import Level, StatusSignal
 from valve_friction_ros.outside_text import printable
+from valve_friction_ros.records.bags.topics import StreamNames
 from valve_friction_ros.wording import name_in_words, number_and_width
 
 _KEY = re.compile(r"(?P<name>.*?)(?: \[(?P<unit>[^\]]*)\])?")
@@ -183,14 +184,6 @@ class Unread(NamedTuple):
     mark: Callable[[], object] | None = None
 
 
-class Sources(NamedTuple):
-    """Sources of the samples of a valve; empty names if unknown."""
-
-    pressure_topic: str = ""
-    stem_topic: str = ""
-    joint: str = ""
-
-
 class Drift(NamedTuple):
     """Drift of the friction, N per month, with half width; the date of a limit ahead, or empty."""
 
@@ -229,7 +222,7 @@ class ValveView:
         Frictions of the baseline; empty without a baseline.
     drift : Drift or None
         A significant drift.
-    sources : Sources
+    sources : StreamNames
         Topics of its samples.
     alarms : tuple of Alarm
         Its alarms that are not normal.
@@ -253,7 +246,7 @@ class ValveView:
     parameters: tuple[Quantity, ...] = ()
     baseline: tuple[Quantity, ...] = ()
     drift: Drift | None = None
-    sources: Sources = Sources()  # noqa: RUF009 - a tuple
+    sources: StreamNames = StreamNames()  # noqa: RUF009 - a tuple
     alarms: tuple[Alarm, ...] = ()
     lacks: tuple[BaselineLack, ...] = ()
     survey: str = ""
@@ -365,7 +358,7 @@ def view_of(node: str, status: Status) -> ValveView:
         parameters=_parameters(values),
         baseline=_baseline(values),
         drift=_drift(values),
-        sources=Sources(*(values.get(key, "") for key in _SOURCES)),
+        sources=StreamNames(*(values.get(key, "") for key in _SOURCES)),
         alarms=alarms_in(values),
         lacks=_lacks(values),
         survey=_text(values, "survey", 20),

@@ -133,11 +133,6 @@ class FrictionState(Enum):
         return _MEANINGS[self][2]
 
     @property
-    def is_uncertain(self) -> bool:
-        """Whether the friction is beyond a limit, but possibly unchanged."""
-        return self is FrictionState.UNCLEAR
-
-    @property
     def level(self) -> Level:
         """Severity of the state."""
         return _MEANINGS[self][0]
@@ -569,7 +564,7 @@ def against(
     """
     state = friction_state(ratio, limits)
     statement = said(
-        Code.COMPARED_AGAIN if state.is_uncertain else Code.COMPARED,
+        Code.COMPARED_AGAIN if state is FrictionState.UNCLEAR else Code.COMPARED,
         state=state.name,
         what=ratio.friction,
         ratio=ratio.interval,

@@ -342,7 +342,7 @@ class EvidenceWatch:
         """Return a finding if friction has grown or collapsed."""
         self._settle()
         diagnosis = self.diagnosis
-        if diagnosis is None or diagnosis.level < Level.WARN or diagnosis.state.is_uncertain:
+        if diagnosis is None or diagnosis.level < Level.WARN:
             return ()
         statement, leads = diagnosis.statement, self._leads(diagnosis)
         if not leads:
