@@ -47,7 +47,6 @@ from valve_friction_ros.evidence.balance import (
     design_of,
     levels_of,
     priors,
-    scales_of,
     with_onsets,
 )
 from valve_friction_ros.evidence.estimate import series_of
@@ -359,9 +358,7 @@ WEIGHTS = np.random.default_rng(1)
 @pytest.fixture(scope="module", params=[0.4, 3.0], ids=["one preload", "preloads by the hour"])
 def design(request):
     moves = Moves.of(made_moves(request.param, lambda hour: 300.0 + 20.0 * hour, noise=10.0))
-    steps = levels_of(moves)
-    scales = scales_of(moves, steps[0])
-    plain = design_of(moves, blocks_of(moves), scales, steps)
+    plain, scales = design_of(moves, blocks_of(moves))
     precision = priors(plain, scales, moves, VALVE.travel)
     return with_onsets(plain, moves, scales.place), precision
 

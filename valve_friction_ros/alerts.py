@@ -36,7 +36,7 @@ from typing import NamedTuple, Protocol
 from urllib.parse import SplitResult, unquote, urlsplit
 from urllib.request import getproxies, proxy_bypass
 
-from valve_friction_ros.health import Level
+from valve_friction_ros.health.levels import Level
 from valve_friction_ros.outside_text import is_loopback
 
 

@@ -23,6 +23,7 @@ import numpy as np
 
 from benchmark.reality.records import Nominal, Record
 from valve_friction_ros.health import Baseline, FrictionLimits, Level, StatusSignal, diagnose_valve
+from valve_friction_ros.health.diagnosis import FrictionState
 from valve_friction_ros.health.measured import Measured
 from valve_friction_ros.health.standstill import held_finding, held_numbers
 from valve_friction_ros.identification import (
@@ -165,7 +166,7 @@ def alarms(answer: Answer, healthy: Answer) -> dict[str, str]:
     found = {}
     if friction.status_signal is not StatusSignal.GOOD or friction.level is not Level.OK:
         state = friction.state
-        unsure = "perhaps" if state.is_uncertain else "other"
+        unsure = "perhaps" if state is FrictionState.UNCLEAR else "other"
         found[unsure if state.side is None else state.side.value] = _words(friction)
     for finding in findings:
         if finding.status_signal is not StatusSignal.GOOD or finding.level is not Level.OK:

@@ -207,7 +207,7 @@ def test_without_an_identifier_an_alarm_comes_back_when_its_shelving_ends(file, 
         kept.refresh()
         kept.refresh()
         (heard,) = plant.valves(1e9)
-        assert [one.state for one in heard.view.alarms] == [state]
+        assert [one.state.value for one in heard.view.alarms] == [state]
     (newest, *_) = alarm_events(file)
     assert (newest.event.action, newest.event.time) == (AlarmAction.EXPIRE, NOW + 60 * SECOND)
 

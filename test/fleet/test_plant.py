@@ -348,7 +348,7 @@ class TestDashboard:
             request_alarms(*asked)
         kept.refresh()
         (alarm,) = self.view(valves).view.alarms
-        assert (alarm.kind, alarm.state) == ("friction_high", "acknowledged")
+        assert (alarm.kind.value, alarm.state.value) == ("friction_high", "acknowledged")
 
     def test_pages_in_a_browser_where_ros_cannot_be_imported(self, shown):
         pytest.importorskip("nicegui", reason="NiceGUI is not installed")

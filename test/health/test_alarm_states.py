@@ -506,7 +506,7 @@ def test_nor_where_the_limits_are_as_narrow_as_the_scatter(pairs):
     ]
     assert len(beyond) > len(SEEDS) / 5
     assert [one.state.side for one in found] == [None] * len(SEEDS)
-    assert all(one.state.is_uncertain for one in beyond)
+    assert all(one.state is FrictionState.UNCLEAR for one in beyond)
 
 
 def test_friction_grown_by_half_is_always_seen(tight_record, unchanged):

@@ -7,8 +7,9 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Streams that are polled, and the executor that runs what is ready, over real DDS."""
+"""Streams that are polled, what is read out of their messages, and the executor of the nodes."""
 
+import contextlib
 import time
 from types import SimpleNamespace
 
@@ -16,21 +17,34 @@ import numpy as np
 import processes
 import pytest
 import rclpy
+from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from live_nodes import SECOND, Client, Domain, time_of
 from processes import PATIENCE
 from rclpy.duration import Duration
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.experimental import EventsExecutor
-from rclpy.serialization import deserialize_message
+from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import FluidPressure, JointState
-from std_msgs.msg import Float64
+from std_msgs.msg import Float64, Header
 from std_srvs.srv import Trigger
 
+from valve_friction_ros.nodes.dashboard import status_of, statuses_in
 from valve_friction_ros.nodes.identifier.valve_inputs import ValveInputs, _Input
+from valve_friction_ros.nodes.plumbing import messages
+from valve_friction_ros.nodes.plumbing.messages import (
+    arrivals_of,
+    position_of,
+    positions_in,
+    pressures_in,
+    stamp_of,
+)
 from valve_friction_ros.nodes.plumbing.polled_node import PolledNode, TurnExecutor, create_service
-from valve_friction_ros.nodes.plumbing.polled_subscription import PolledSubscription
+from valve_friction_ros.nodes.plumbing.polled_subscription import PolledSubscription, TakenMessage
 from valve_friction_ros.nodes.plumbing.qos import blocks, stream
-from valve_friction_ros.streams import Losses
+from valve_friction_ros.streams import Kind, Losses
 
 
 @pytest.fixture
@@ -256,3 +270,241 @@ class TestTurn:
         self.requests(client, 1)
         wait_until(lambda: executor.turn() or node.failures, "the bug")
         assert node.failures[0].startswith("internal error: ZeroDivisionError")
+
+
+NUMBERS = st.floats(width=64)
+TIMES = st.builds(Time, sec=st.integers(-(2**31), 2**31 - 1), nanosec=st.integers(0, 999_999_999))
+WORDS = st.text(st.characters(codec="utf-8", exclude_characters="\0"), max_size=12)
+NAMES = st.lists(st.one_of(WORDS, st.sampled_from(["stem", "arm"])), max_size=5)
+
+
+def pressure(stamp, value, frame="actuator", variance=0.0):
+    header = Header(stamp=stamp, frame_id=frame)
+    return FluidPressure(header=header, fluid_pressure=value, variance=variance)
+
+
+def serialised(messages):
+    return [bytes(serialize_message(message)) for message in messages]
+
+
+def assert_same(found, expected):
+    """Equal to the last bit, nan included."""
+    found, expected = np.asarray(found, float), np.asarray(expected, float)
+    np.testing.assert_array_equal(found, expected)
+    np.testing.assert_array_equal(np.signbit(found), np.signbit(expected))
+
+
+def check_pressures(raw):
+    read = [deserialize_message(one, FluidPressure) for one in raw]
+    stamps, values = pressures_in(raw)
+    assert stamps.tolist() == [stamp_of(one.header.stamp) for one in read]
+    assert_same(values, [one.fluid_pressure for one in read])
+
+
+def check_positions(raw, joint):
+    read = [deserialize_message(one, JointState) for one in raw]
+    expected = [position_of(one, joint) for one in read]
+    kinds, stamps, values = positions_in(raw, joint)
+    assert stamps.tolist() == [stamp_of(one.header.stamp) for one in read]
+    assert (kinds == Kind.POSITION).tolist() == [one is not None for one in expected]
+    assert_same(values, [np.nan if one is None else one for one in expected])
+
+
+@st.composite
+def joint_states(draw, count):
+    """Messages of one publisher: names and counts are the same, numbers differ."""
+    frame, names = draw(WORDS), draw(NAMES)
+    sizes = [draw(st.integers(0, 5)) for _ in range(3)]
+
+    def message():
+        arrays = [draw(st.lists(NUMBERS, min_size=size, max_size=size)) for size in sizes]
+        return JointState(
+            header=Header(stamp=draw(TIMES), frame_id=frame),
+            name=names,
+            **dict(zip(("position", "velocity", "effort"), arrays, strict=True)),
+        )
+
+    return [message() for _ in range(count)]
+
+
+@pytest.mark.parametrize("publishers", ["one", "several"])
+@given(frame=WORDS, samples=st.lists(st.tuples(TIMES, NUMBERS, WORDS, NUMBERS), max_size=20))
+def test_pressures(publishers, frame, samples):
+    check_pressures(
+        serialised(
+            pressure(at, value, frame if publishers == "one" else own, more)
+            for at, value, own, more in samples
+        )
+    )
+
+
+@settings(deadline=None)
+@given(data=st.data(), joint=st.sampled_from(["stem", "", "arm"]))
+def test_positions_of_one_publisher(data, joint):
+    check_positions(serialised(data.draw(joint_states(data.draw(st.integers(0, 6))))), joint)
+
+
+@settings(deadline=None)
+@given(data=st.data())
+def test_positions_of_several_publishers(data):
+    parts = [data.draw(joint_states(2)) for _ in range(3)]
+    mixed = [message for several in zip(*parts, strict=True) for message in several]
+    check_positions(serialised(mixed), "stem")
+
+
+@given(garbage=st.lists(st.binary(max_size=12), min_size=2, max_size=8))
+def test_bytes_after_the_message_and_in_its_padding_are_nothing(garbage):
+    """rclpy leaves either of them as it finds it."""
+    raw = serialised(pressure(Time(sec=k), 1e5 + k, "abcdef") for k in range(len(garbage)))
+    assert raw[0][12:23] == b"\x07\0\0\0abcdef\0"  # then five bytes of padding
+    spoilt = [
+        one[:23] + (extra + b"\xff").ljust(5, b"\xaa")[:5] + one[28:] + extra
+        for one, extra in zip(raw, garbage, strict=True)
+    ]
+    check_pressures(spoilt)
+    assert messages._alike(spoilt, messages._pressure_layout) is not None
+
+
+def test_a_stream_is_decoded_as_a_table(monkeypatch):
+    """What a publisher usually sends never comes to be deserialised one by one."""
+
+    def refuse(*_):
+        raise AssertionError("one by one")
+
+    pressures = serialised(pressure(Time(sec=-k, nanosec=k), 1e5 + k) for k in range(300))
+    stems = serialised(
+        JointState(header=Header(stamp=Time(sec=k)), name=["arm", "stem"], position=[0.0, 1e-3 * k])
+        for k in range(300)
+    )
+    monkeypatch.setattr(messages, "deserialize_message", refuse)
+    assert pressures_in(pressures).values.tolist() == [1e5 + k for k in range(300)]
+    assert positions_in(stems, "stem").values.tolist() == [1e-3 * k for k in range(300)]
+
+
+def big_endian(message):
+    """Serialise a pressure without frame the other way round."""
+    fields = [
+        np.array([message.header.stamp.sec, message.header.stamp.nanosec, 1], ">i4").tobytes(),
+        b"\0\0\0\0",  # the frame's end, and padding
+        np.array([message.fluid_pressure, message.variance], ">f8").tobytes(),
+    ]
+    return b"\x00\x00\x00\x00" + b"".join(fields)
+
+
+def test_the_other_byte_order():
+    check_pressures([big_endian(pressure(Time(sec=k, nanosec=7), 1e5 + k, "")) for k in range(3)])
+
+
+@pytest.mark.parametrize("cut", [0, 3, 11, 20, 30])
+def test_what_is_no_message_is_refused_by_the_library(cut):
+    (whole,) = serialised([pressure(Time(sec=1), 1e5)])
+    with pytest.raises(RuntimeError, match="deserialize"):
+        pressures_in([whole[:cut]])
+
+
+def as_taken(messages, received):
+    return [TakenMessage(*pair) for pair in zip(serialised(messages), received, strict=True)]
+
+
+def test_arrivals_are_in_the_order_of_their_receipt():
+    of_stem = [1, 2, 5]
+    pressures = as_taken(
+        (pressure(Time(nanosec=k), 1.0 * k) for k in (0, 3, 4, 6)), received=(10, 13, 14, 16)
+    )
+    stems = as_taken(
+        (
+            JointState(
+                header=Header(stamp=Time(nanosec=k)),
+                name=["stem" if k != 5 else "arm"],
+                position=[0.5 * k],
+            )
+            for k in of_stem
+        ),
+        received=(11, 12, 15),
+    )
+    kinds, stamps, values = arrivals_of(pressures, stems, "stem")
+    assert kinds.tolist() == [0, 1, 1, 0, 0, Kind.NO_POSITION, 0]
+    assert stamps.tolist() == list(range(7))
+    assert_same(values, [0.0, 0.5, 1.0, 3.0, 4.0, np.nan, 6.0])
+    assert arrivals_of([], [], "stem").stamps.size == 0
+
+
+def test_a_topic_keeps_its_order_when_the_clock_of_receipt_is_set_back():
+    pressures = as_taken(
+        (pressure(Time(nanosec=k), 1.0) for k in range(4)), received=(10, 20, 5, 6)
+    )
+    stems = as_taken([JointState(header=Header(stamp=Time(nanosec=9)), position=[0.0])], [15])
+    assert arrivals_of(pressures, stems, "").stamps.tolist() == [0, 9, 1, 2, 3]
+
+
+# CDR ends a text with a zero byte, so none is inside; ROS sends UTF-8.
+TEXT = st.text(st.characters(exclude_characters="\0", exclude_categories=("Cs",)), max_size=20)
+STATUSES = st.builds(
+    DiagnosticStatus,
+    level=st.binary(min_size=1, max_size=1),
+    name=TEXT,
+    message=TEXT,
+    hardware_id=TEXT,
+    values=st.lists(st.builds(KeyValue, key=TEXT, value=TEXT), max_size=5),
+)
+
+
+def array(statuses, frame=""):
+    message = DiagnosticArray(status=statuses)
+    message.header.frame_id = frame
+    return bytes(serialize_message(message))
+
+
+@given(st.lists(STATUSES, max_size=4), TEXT)
+def test_they_are_what_rclpy_reads(statuses, frame):
+    found = [(one.name, one.read()) for one in statuses_in(array(statuses, frame))]
+    assert found == [(one.name, status_of(one)) for one in statuses]
+
+
+@given(st.data())
+def test_other_bytes_are_refused(data):
+    """A message that ends early, or any bytes: a status, or ValueError, and nothing else."""
+    whole = array(data.draw(st.lists(STATUSES, min_size=1, max_size=2)))
+    cut = whole[: data.draw(st.integers(0, len(whole)))]
+    for message in (cut, data.draw(st.binary(max_size=60)), b"\0\1" + data.draw(st.binary())):
+        with contextlib.suppress(ValueError):
+            for one in statuses_in(message):
+                one.read()
+        with contextlib.suppress(ValueError):
+            for one in statuses_in(message):
+                one.mark()
+
+
+def test_what_ends_within_its_name_is_refused():
+    with pytest.raises(ValueError, match="no diagnostics"):
+        list(statuses_in(array([DiagnosticStatus(name="a" * 40)])[:30]))
+
+
+def marks(*statuses):
+    return [one.mark() for one in statuses_in(array(statuses))]
+
+
+def said(message="friction normal", age="1.0", ratio="1.02", count="5"):
+    pairs = {"friction_ratio": ratio, "estimate_age [s]": age, "buffered_samples": count}
+    values = [KeyValue(key=key, value=value) for key, value in pairs.items()]
+    return DiagnosticStatus(name="/v/identifier: friction", message=message, values=values)
+
+
+def test_a_mark_is_that_of_its_status_and_its_essential_keys():
+    """Ages and counters leave it, and so does a key within another one."""
+    assert marks(said()) == marks(said(age="2.0", count="7"))
+    assert marks(said()) != marks(said(ratio="1.03"))
+    assert marks(said()) != marks(said(message="friction has grown"))
+    alike = DiagnosticStatus(values=[KeyValue(key="my friction_ratio", value="9")])
+    assert marks(alike, said()) == [*marks(DiagnosticStatus()), *marks(said())]
+
+
+def test_bytes_between_the_texts_leave_the_mark():
+    """The serialiser leaves them as they were in its memory."""
+    whole = bytearray(array([said(message="ab")]))  # three bytes and a zero: none is needed
+    (before,) = (one.mark() for one in statuses_in(bytes(whole)))
+    place = whole.index(b"friction_ratio\0") + len(b"friction_ratio\0")
+    assert -place % 4
+    whole[place : place + -place % 4] = b"\xee" * (-place % 4)
+    (after,) = (one.mark() for one in statuses_in(bytes(whole)))
+    assert after == before

@@ -28,7 +28,6 @@ from sensor_msgs.msg import JointState
 from service import SECOND, START, made_moves
 from service import VALVE as BUILT
 
-from valve_friction_ros.dashboard.live_state import Sources
 from valve_friction_ros.evidence import Move
 from valve_friction_ros.health import FrictionMonitor, MonitorSettings
 from valve_friction_ros.history import HistoryError, HistoryFile, KeptValve, read_moves
@@ -44,6 +43,7 @@ from valve_friction_ros.nodes.identifier.usage_watch import UsageWatch
 from valve_friction_ros.nodes.identifier.workers import HistoryThread, Workers
 from valve_friction_ros.nodes.plumbing import polled_subscription
 from valve_friction_ros.nodes.plumbing.worker import Worker
+from valve_friction_ros.records.bags.topics import StreamNames
 from valve_friction_ros.streams import Arrivals, Kind
 
 
@@ -117,14 +117,14 @@ def subscriptions(monkeypatch):
 @pytest.mark.usefixtures("subscriptions")
 @pytest.mark.parametrize("topics", [("no topic", "/stem"), ("/pressure", "no topic")])
 def test_a_name_that_is_none_is_told_and_leaves_nothing_open(topics):
-    node, heard = Node(), {"/v/identifier": Sources(*topics, "stem")}
+    node, heard = Node(), {"/v/identifier": StreamNames(*topics, "stem")}
     signals = WatchedSignals(heard.__getitem__)
     strip = signals.watch("/v/identifier")
     for _ in range(3):
         signals.step(node)
     assert node.open == []
     assert strip.note() == "'no topic' cannot be subscribed to: Invalid topic name: has a space:"
-    heard["/v/identifier"] = Sources("/pressure", "/stem", "stem")
+    heard["/v/identifier"] = StreamNames("/pressure", "/stem", "stem")
     signals.step(node)
     assert node.open == ["/pressure", "/stem"]
     assert strip.trouble == ""

@@ -7,18 +7,24 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The programme: exact where there is no noise, and checks that can fail."""
+"""The programme of the paper, exact without noise; and the command: what it writes and refuses."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from pages import PageReader
+from paper import command
 from paper.bench import BENCH_NAMES, read_bench
 from paper.checks import all_checks, force_terms, summary, within, written
-from paper.experiments import TRIANGLE, run
+from paper.experiments import TRIANGLE
+from paper.experiments import run as experiment
 from paper.programme import progress_steps, rounded_bias
 
+from valve_friction_ros.commands import reproduce_paper
+from valve_friction_ros.commands.main import run
 from valve_friction_ros.identification import (
     IdentificationSettings,
     identify_signature,
@@ -87,12 +93,12 @@ def test_a_missing_bench_file_is_named(tmp_path):
 def test_without_noise_model_1_is_the_truth(name):
     """The paper's whole way, x̄ from the triangle included."""
     silent = bench(name, SensorNoise())
-    triangle = run(silent, TRIANGLE, 2.5 * TRIANGLE.period)
+    triangle = experiment(silent, TRIANGLE, 2.5 * TRIANGLE.period)
     np.testing.assert_array_equal(triangle.measured.position, triangle.clean.position)
     signature = identify_signature(triangle.measured, silent.valve).signature
     bias = rounded_bias(signature.position_bias)
     assert bias == 1.13e-3
-    square = run(silent, silent.square, 3 * silent.square.period)
+    square = experiment(silent, silent.square, 3 * silent.square.period)
     settings = IdentificationSettings(position_bias=bias, assumed_mass=1.6)
     found = published_estimate(square.measured, silent.valve, settings).values
     for key in ("viscous_friction", "coulomb_friction", "static_friction", "spring_constant"):
@@ -101,7 +107,8 @@ def test_without_noise_model_1_is_the_truth(name):
 
 def test_noise_is_of_the_sensors_only_and_by_the_seed():
     first, again, other = (
-        run(bench("low", SensorNoise(1e-5, 100.0, seed)), SquareWave(), 10.4) for seed in (1, 1, 2)
+        experiment(bench("low", SensorNoise(1e-5, 100.0, seed)), SquareWave(), 10.4)
+        for seed in (1, 1, 2)
     )
     np.testing.assert_array_equal(first.measured.position, again.measured.position)
     assert not np.array_equal(first.measured.position, other.measured.position)
@@ -198,3 +205,133 @@ def test_terms_add_up_to_the_force_while_the_stem_slides(reproduced):
 
 def test_progress_is_told_as_often_as_announced(reproduced):
     assert len(reproduced.told) == progress_steps(reproduced.programme.results)
+
+
+PICTURES = {
+    "excitations",
+    "figure_2_graphite",
+    *(f"figure_{number}" for number in (1, 2, 5, 6, 7, 8, 9)),
+    *(f"figure_{number}_{name}" for number in (3, 4) for name in ("low", "high", "graphite")),
+    "validation_graphite_sine",
+    "validation_graphite_isa",
+}
+
+
+@pytest.fixture(scope="module")
+def page(reproduced):
+    return PageReader((reproduced.output / "reproduction.html").read_text(encoding="utf-8"))
+
+
+@pytest.mark.slow
+def test_the_report_and_every_figure_are_written(reproduced):
+    assert reproduced.code == 0
+    names = {path.name for path in reproduced.output.iterdir()}
+    assert names == {"reproduction.html", *(f"{name}.png" for name in PICTURES)}
+    for name in PICTURES:
+        assert (reproduced.output / f"{name}.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_last_line_counts_and_names(reproduced):
+    checks = all_checks(reproduced.programme)
+    missed = [check.name for check in checks if not check.matched]
+    count, _, names = reproduced.lines[-1].partition("; not matched: ")
+    assert count == f"{len(checks) - len(missed)} of {len(checks)} matched"
+    assert names == "; ".join(missed) + "."
+
+
+def test_every_item_has_its_section_and_its_checks(reproduced, page):
+    titles = page.said("h2")
+    assert titles[0] == "Not matched"
+    assert [title.partition(".")[0] for title in titles[1:]] == [str(n) for n in range(1, 11)]
+    checks = all_checks(reproduced.programme)
+    assert {check.item for check in checks} == set(range(1, 11))
+    missed = [check for check in checks if not check.matched]
+    cells = page.said("td")
+    assert cells.count("✓") == len(checks) - len(missed)
+    assert cells.count("✗") == 2 * len(missed)
+    for check in checks:
+        assert cells.count(typeset(check.name)) == 1 + (not check.matched)
+    assert len(page.images) == len(PICTURES)
+
+
+def test_the_lead_counts_and_the_first_table_lists(reproduced, page):
+    """Twelve items do not belong into a sentence."""
+    checks = all_checks(reproduced.programme)
+    missed = [check.name for check in checks if not check.matched]
+    assert len(missed) > 1
+    assert page.lead.endswith(f" {len(checks) - len(missed)} of {len(checks)} matched.")
+    assert not any(name in page.lead for name in missed)
+    assert [row[1] for row in page.tables[0][1:]] == [typeset(name) for name in missed]
+
+
+def typeset(text):
+    """As the page writes it."""
+    return re.sub(r"(?<![\w.-])-(?=\d)", "−", text)
+
+
+def test_the_page_needs_no_other_file(reproduced):
+    text = (reproduced.output / "reproduction.html").read_text(encoding="utf-8")
+    assert not re.search(r"https?:|<script|<link|url\(", text)
+
+
+def test_the_noise_of_the_run_is_stated(page):
+    assert any("1 µm and 5 Pa (standard deviations), seed 3" in text for text in page.said("p"))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["--seed", "-1"], "--seed must not be negative"),
+        (["--position-noise-um", "-1"], "--position-noise-um must be finite and not negative"),
+        (["--pressure-noise-pa", "nan"], "--pressure-noise-pa must be finite and not negative"),
+        (["--config", "nowhere"], "nowhere/bench_low.yaml: cannot be read"),
+    ],
+)
+def test_wrong_options_are_refused_in_one_line(tmp_path, monkeypatch, capsys, arguments, told):
+    monkeypatch.chdir(tmp_path)
+    assert run(["reproduce-paper", *arguments]) == 2
+    error = capsys.readouterr().err
+    assert error.startswith("valve_friction reproduce-paper: ")
+    assert told in error
+    assert error.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_output_that_is_a_file_is_refused(tmp_path, capsys):
+    (tmp_path / "taken").write_text("")
+    assert run(["reproduce-paper", "--output", str(tmp_path / "taken")]) == 2
+    told = f"{tmp_path / 'taken'}: not a folder: give --output another name"
+    assert capsys.readouterr().err == f"valve_friction reproduce-paper: {told}\n"
+
+
+def test_noise_that_hides_everything_is_refused_with_the_packing(tmp_path, capsys):
+    options = ["reproduce-paper", "--output", str(tmp_path), "--position-noise-um", "1000"]
+    assert run(options) == 2
+    refusal = capsys.readouterr().err.splitlines()[-1]
+    assert refusal.startswith(
+        "valve_friction reproduce-paper: packing low: sampling is too slow for the motion"
+    )
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_noise_of_the_command_line_replaces_the_configured(monkeypatch, tmp_path):
+    seen = {}
+
+    def refuse(benches, *_):
+        seen.update({name: bench.noise for name, bench in benches.items()})
+        raise ValueError("enough")
+
+    monkeypatch.setattr(command, "run_programme", refuse)
+    options = ["--position-noise-um", "0", "--pressure-noise-pa", "7", "--seed", "4"]
+    assert run(["reproduce-paper", "--output", str(tmp_path), *options]) == 2
+    assert {(one.position, one.pressure, one.seed) for one in seen.values()} == {(0.0, 7.0, 4)}
+
+
+def test_an_installation_without_it_says_where_it_is(monkeypatch, tmp_path, capsys):
+    monkeypatch.setattr(
+        reproduce_paper, "__file__", str(tmp_path / "package" / "commands" / "a.py")
+    )
+    assert run(["reproduce-paper", "--output", str(tmp_path)]) == 2
+    told = capsys.readouterr().err
+    assert told.startswith("valve_friction reproduce-paper: the reproduction is not part of the")
+    assert told.endswith("where it lies in examples/paper\n")

@@ -18,7 +18,7 @@ from rich.progress import SpinnerColumn, TextColumn, TimeElapsedColumn
 from valve_friction_ros.commands.arguments.identification import has_failed
 from valve_friction_ros.commands.console import shown_progress
 from valve_friction_ros.commands.process import ExitCode, StopSignals, complain
-from valve_friction_ros.identification import RefusalError
+from valve_friction_ros.identification.refusal import RefusalError
 
 _DISCOVERY = 5.0
 """Time to search for an identifier, s. Chosen: nodes on a network find each other in 1 to 3 s."""

@@ -24,7 +24,7 @@ from valve_friction_ros.commands.arguments.declared import EARLIEST, LATEST
 from valve_friction_ros.commands.arguments.identification import chosen_valves, has_failed
 from valve_friction_ros.commands.console import plain_console
 from valve_friction_ros.commands.process import ExitCode
-from valve_friction_ros.health import FrictionState
+from valve_friction_ros.health.diagnosis import FrictionState
 from valve_friction_ros.history import (
     AlarmRecording,
     History,
@@ -36,7 +36,8 @@ from valve_friction_ros.history import (
     read_usage,
     valve_histories,
 )
-from valve_friction_ros.identification import SLIDING, parameter_columns, plain
+from valve_friction_ros.identification.rendering import parameter_columns, plain
+from valve_friction_ros.identification.settings import SLIDING
 from valve_friction_ros.outside_text import csv_text, printable
 from valve_friction_ros.records.files import write_whole
 from valve_friction_ros.response import ResponseSummary

@@ -33,22 +33,18 @@ from valve_friction_ros.commands.arguments.recording import (
     save_columns,
 )
 from valve_friction_ros.commands.process import ExitCode, complain
-from valve_friction_ros.health import (
-    Baseline,
-    Diagnosis,
-    Finding,
-    FrictionLimits,
-    Level,
-    Survey,
-)
+from valve_friction_ros.health.baseline import Baseline
+from valve_friction_ros.health.diagnosis import Diagnosis, FrictionLimits
 from valve_friction_ros.health.friction_monitor import (
     MonitorSettings,
     diagnose_outcome,
     identify_recording,
 )
+from valve_friction_ros.health.levels import Finding, Level, Survey
 from valve_friction_ros.health.valve_numbers import RefusedRecordError
-from valve_friction_ros.identification import RefusalError, Result
-from valve_friction_ros.model import Recording
+from valve_friction_ros.identification.refusal import RefusalError
+from valve_friction_ros.identification.result import Result
+from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.outside_text import printable
 from valve_friction_ros.records.recorded_valve import RecordedValve, Stretch
 from valve_friction_ros.records.recordings import ReadingOptions, read_recordings

@@ -78,10 +78,10 @@ from valve_friction_ros.fleet.workers import (
     in_processes,
     usable_cores,
 )
-from valve_friction_ros.health import Level
-from valve_friction_ros.identification import FIXABLE
-from valve_friction_ros.model import Valve
+from valve_friction_ros.health.levels import Level
+from valve_friction_ros.identification.settings import FIXABLE
 from valve_friction_ros.model.checks import frozen
+from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.records.bags.topics import VALVE_FILE, is_bag
 from valve_friction_ros.records.files import explained, on_disk, place
 from valve_friction_ros.records.recordings import ReadingOptions

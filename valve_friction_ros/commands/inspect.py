@@ -27,7 +27,7 @@ from valve_friction_ros.commands.arguments.recording import (
 )
 from valve_friction_ros.commands.console import plain_console
 from valve_friction_ros.commands.process import ExitCode, complain
-from valve_friction_ros.identification import plain
+from valve_friction_ros.identification.rendering import plain
 from valve_friction_ros.outside_text import printable
 from valve_friction_ros.records.bags.topics import is_bag
 from valve_friction_ros.records.layout import Layout

@@ -24,15 +24,10 @@ from valve_friction_ros.commands.arguments import require_outputs
 from valve_friction_ros.commands.arguments.planning import frictions_from, planned_settings
 from valve_friction_ros.commands.console import plain_console, shown_progress
 from valve_friction_ros.commands.process import ExitCode
-from valve_friction_ros.identification import SLIDING, UNITS, percentage, plain
-from valve_friction_ros.planning import (
-    Conditions,
-    Limits,
-    StrokePlan,
-    plan_remarks,
-    plan_test,
-)
-from valve_friction_ros.planning.search import Forecast
+from valve_friction_ros.identification.rendering import plain
+from valve_friction_ros.identification.settings import SLIDING, UNITS
+from valve_friction_ros.planning.conditions import Conditions, Limits
+from valve_friction_ros.planning.search import Forecast, StrokePlan, plan_remarks, plan_test
 from valve_friction_ros.planning.steps import (
     FINEST_POSITION,
     FINEST_PRESSURE,
@@ -45,7 +40,7 @@ from valve_friction_ros.planning.steps import (
 from valve_friction_ros.records.files import write_whole
 from valve_friction_ros.records.units import POSITION_UNITS, PRESSURE_UNITS, span
 from valve_friction_ros.records.valve_file import ValveFile, read_valve_file
-from valve_friction_ros.wording import number_and_width
+from valve_friction_ros.wording import number_and_width, percentage
 
 _NAMES = (
     "coulomb_friction",

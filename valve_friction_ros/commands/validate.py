@@ -17,15 +17,15 @@ from collections.abc import Sequence
 from valve_friction_ros.commands.arguments.identification import read_estimate
 from valve_friction_ros.commands.arguments.recording import described, read_one
 from valve_friction_ros.commands.process import ExitCode
-from valve_friction_ros.identification import (
-    RefusalError,
+from valve_friction_ros.identification.refusal import RefusalError
+from valve_friction_ros.identification.rendering import plain
+from valve_friction_ros.identification.steps.validation import (
     Validation,
     identified_model,
-    plain,
     validate,
 )
 from valve_friction_ros.identification.trust.verdict import LEAST_FIT
-from valve_friction_ros.model import Valve
+from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.outside_text import printable
 from valve_friction_ros.wording import percentage
 

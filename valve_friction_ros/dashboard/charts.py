@@ -21,7 +21,7 @@ from zoneinfo import ZoneInfo
 import numpy as np
 
 from valve_friction_ros.dashboard.live_strip import Strip
-from valve_friction_ros.health import AlarmAction, AlarmEvent
+from valve_friction_ros.health.alarms import AlarmAction, AlarmEvent
 from valve_friction_ros.history import (
     LIMIT_NAMES,
     Trend,
@@ -30,8 +30,8 @@ from valve_friction_ros.history import (
     friction_of,
     trended,
 )
-from valve_friction_ros.identification import Verdict
-from valve_friction_ros.model import Recording
+from valve_friction_ros.identification.trust.verdict import Verdict
+from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.streams import utc
 
 _BLUE, _ORANGE, _GREY, _GREEN = "#0072B2", "#D55E00", "#8a949f", "#009E73"

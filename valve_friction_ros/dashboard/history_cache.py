@@ -28,19 +28,9 @@ from valve_friction_ros.dashboard.live_state import (
     Plant,
     Status,
     Unread,
-    ValveAlarm,
-    alarms_in,
 )
-from valve_friction_ros.health import (
-    Alarm,
-    AlarmError,
-    AlarmKind,
-    Level,
-    StatusSignal,
-    Survey,
-    dead_band,
-    dead_band_half_width,
-)
+from valve_friction_ros.health.alarms import Alarm, AlarmError, AlarmKind, AlarmState
+from valve_friction_ros.health.levels import Level, StatusSignal, Survey
 from valve_friction_ros.history import (
     AlarmFilter,
     HistoryError,
@@ -226,14 +216,16 @@ class HistoryCache:
             return ()
         return database.alarm_events(self.file, chosen, most, is_standing=not is_journal)
 
-    def valve_alarms(self, node: str) -> tuple[ValveAlarm, ...] | None:
+    def valve_alarms(self, node: str) -> tuple[Alarm, ...] | None:
         """Read the alarms of a valve that are not normal; None if no file holds the valve.
 
         Raises HistoryError if the file cannot be read.
         """
         if self.file is None or not self.is_file or all(one.name != node for one in self.valves):
             return None
-        return alarms_in(alarm_values(database.read_alarms(self.file, node)))
+        alarms = database.read_alarms(self.file, node)
+        known = (alarms.get(kind, Alarm(kind)) for kind in AlarmKind)
+        return tuple(one for one in known if one.state is not AlarmState.NORMAL)
 
     @property
     def is_file(self) -> bool:
@@ -281,9 +273,8 @@ def _status_of(kept: ValveHistory) -> Status:
     if found is not None:
         built = json.loads(found.settings).get("valve", {})
         valve = Valve(**{name: value for name, value in built.items() if value is not None})
-        band, half_width = dead_band(found, valve), dead_band_half_width(found, valve)
         values["estimate_time"] = exact_time(found.time)
-        values |= result_values(found.to_dict(), band, half_width)
+        values |= result_values(found, valve)
     baseline = None if kept.set_baseline is None else kept.set_baseline.baseline
     values |= baseline_values(baseline)
     if baseline is None and diagnosis.survey is not Survey.UNKNOWN:

@@ -19,17 +19,13 @@ from dataclasses import dataclass, field, replace
 from datetime import datetime
 from typing import NamedTuple
 
-from valve_friction_ros.health import (
-    AlarmState,
-    BaselineLack,
-    Lack,
-    Level,
-    Ratio,
-    StatusSignal,
-)
+from valve_friction_ros.health.alarms import Alarm, AlarmKind, AlarmState, Condition
+from valve_friction_ros.health.baseline import BaselineLack, Lack
+from valve_friction_ros.health.comparison import Ratio
+from valve_friction_ros.health.levels import Level, StatusSignal
 from valve_friction_ros.outside_text import printable
-from valve_friction_ros.settings import ALARM_KINDS
-from valve_friction_ros.wording import alarm_advice, name_in_words, number_and_width
+from valve_friction_ros.records.bags.topics import StreamNames
+from valve_friction_ros.wording import name_in_words, number_and_width
 
 _KEY = re.compile(r"(?P<name>.*?)(?: \[(?P<unit>[^\]]*)\])?")
 _LONGEST_TEXT = 400
@@ -117,7 +113,7 @@ def _entry(key: str, text: str) -> Entry:
 
 _CHANGE = " change"
 _NORMAL = AlarmState.NORMAL.value
-_ALARMS = tuple(f"alarm {kind}" for kind in ALARM_KINDS)
+_ALARMS = tuple(f"alarm {kind.value}" for kind in AlarmKind)
 _SHOWN = (*_ALARMS, "NE 107", "survey", "estimate_", "reason", "friction_ratio", "friction_drift",
           "limit_expected", "baseline", "dead_band", "travel_histogram", "preparing")  # fmt: skip
 _STARTS = {
@@ -188,52 +184,12 @@ class Unread(NamedTuple):
     mark: Callable[[], object] | None = None
 
 
-class Sources(NamedTuple):
-    """Sources of the samples of a valve; empty names if unknown."""
-
-    pressure_topic: str = ""
-    stem_topic: str = ""
-    joint: str = ""
-
-
 class Drift(NamedTuple):
     """Drift of the friction, N per month, with half width; the date of a limit ahead, or empty."""
 
     value: float
     half_width: float
     expected: str
-
-
-class ValveAlarm(NamedTuple):
-    """An alarm of a valve that is not normal, as published by its identifier.
-
-    Attributes
-    ----------
-    kind, state : str
-        Name of the alarm, and its state in words.
-    level : str
-        Level of its condition: ``OK``, ``WARN`` or ``ERROR``.
-    message : str
-        Sentence on its condition.
-    until : int or None
-        End of shelving or of the time out of service, ns since 1970; None if neither applies.
-    """
-
-    kind: str
-    state: str
-    level: str = "OK"
-    message: str = ""
-    until: int | None = None
-
-    @property
-    def is_told(self) -> bool:
-        """Whether the alarm is active and not suppressed."""
-        return self.level != "OK" and self.until is None
-
-    @property
-    def advice(self) -> str:
-        """Advice on the alarm."""
-        return alarm_advice(self.kind, self.level)
 
 
 @dataclass(frozen=True)
@@ -266,9 +222,9 @@ class ValveView:
         Frictions of the baseline; empty without a baseline.
     drift : Drift or None
         A significant drift.
-    sources : Sources
+    sources : StreamNames
         Topics of its samples.
-    alarms : tuple of ValveAlarm
+    alarms : tuple of Alarm
         Its alarms that are not normal.
     lacks : tuple of BaselineLack
         Conditions of a baseline that the valve does not meet now.
@@ -290,8 +246,8 @@ class ValveView:
     parameters: tuple[Quantity, ...] = ()
     baseline: tuple[Quantity, ...] = ()
     drift: Drift | None = None
-    sources: Sources = Sources()  # noqa: RUF009 - a tuple
-    alarms: tuple[ValveAlarm, ...] = ()
+    sources: StreamNames = StreamNames()  # noqa: RUF009 - a tuple
+    alarms: tuple[Alarm, ...] = ()
     lacks: tuple[BaselineLack, ...] = ()
     survey: str = ""
     values: Mapping[str, str] = field(default_factory=dict, repr=False, compare=False)
@@ -325,7 +281,7 @@ class ValveView:
     def advice(self) -> str:
         """Advice on the most severe active alarm; empty without an alarm."""
         told = [one for one in self.alarms if one.is_told]
-        return max(told, key=lambda one: one.level == "ERROR").advice if told else ""
+        return max(told, key=lambda one: one.condition.level).advice if told else ""
 
     @property
     def friction(self) -> Quantity:
@@ -402,7 +358,7 @@ def view_of(node: str, status: Status) -> ValveView:
         parameters=_parameters(values),
         baseline=_baseline(values),
         drift=_drift(values),
-        sources=Sources(*(values.get(key, "") for key in _SOURCES)),
+        sources=StreamNames(*(values.get(key, "") for key in _SOURCES)),
         alarms=alarms_in(values),
         lacks=_lacks(values),
         survey=_text(values, "survey", 20),
@@ -410,19 +366,20 @@ def view_of(node: str, status: Status) -> ValveView:
     )
 
 
-def alarms_in(values: Mapping[str, str]) -> tuple[ValveAlarm, ...]:
-    """Return the alarms that are not normal, from the values of a status."""
-    return tuple(
-        ValveAlarm(
-            kind,
-            _text(values, name, 40),
-            _text(values, f"{name} level", 10),
-            _text(values, f"{name} message", _LONGEST_SENTENCE),
-            _stamp(values.get(f"{name} until [time]", "")),
-        )
-        for kind, name in zip(ALARM_KINDS, _ALARMS, strict=True)
-        if values.get(name, _NORMAL) != _NORMAL
-    )
+def alarms_in(values: Mapping[str, str]) -> tuple[Alarm, ...]:
+    """Return the alarms that are not normal, from the values of a status, ignoring invalid ones."""
+    found = []
+    for kind in AlarmKind:
+        name = f"alarm {kind.value}"
+        if values.get(name, _NORMAL) == _NORMAL:
+            continue
+        with contextlib.suppress(KeyError, ValueError):
+            level = Level[values[f"{name} level"]]
+            until = _stamp(values.get(f"{name} until [time]", ""))
+            message = values.get(f"{name} message", "")
+            shown = Condition(level, message=message)
+            found.append(Alarm(kind, AlarmState(values[name]), shown, None, until, message))
+    return tuple(found)
 
 
 def _lacks(values: Mapping[str, str]) -> tuple[BaselineLack, ...]:

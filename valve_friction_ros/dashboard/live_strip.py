@@ -17,6 +17,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from valve_friction_ros.streams.samples import Samples
+
 _STILL = 2.0
 """Time without a sample, s, after which the axis moves on by itself."""
 
@@ -48,13 +50,6 @@ def envelope(times: _Floats, values: _Floats, columns: int, span: float) -> Stri
     return Strip(times[kept], values[kept])
 
 
-class _Samples(NamedTuple):
-    """The newest samples of a signal: stamps, ns, and values. The arrays never change."""
-
-    stamps: NDArray[np.int64] = np.empty(0, dtype=np.int64)
-    values: _Floats = np.empty(0)
-
-
 class LiveStrip:
     """Samples of pressure and stem of one valve, from its subscriptions, behind a lock.
 
@@ -69,7 +64,7 @@ class LiveStrip:
         self.trouble = ""
         self._most, self._clock = most, clock
         self._lock = threading.Lock()
-        self._signals = [_Samples(), _Samples()]
+        self._signals = [Samples.joined(), Samples.joined()]
         self._arrivals: list[float | None] = [None, None]
         self._count = 0
 
@@ -83,11 +78,11 @@ class LiveStrip:
         with self._lock:
             kept = self._signals[signal]
             if kept.stamps.size and stamps[-1] < kept.stamps[-1] - 1_000_000_000:
-                kept = _Samples()
-            stamps = np.concatenate([kept.stamps, stamps])[-self._most :]
-            values = np.concatenate([kept.values, values])[-self._most :]
+                kept = Samples.joined()
+            both = Samples.joined(kept, Samples(stamps, values))
+            stamps, values = both.stamps[-self._most :], both.values[-self._most :]
             begin = int(np.argmax(stamps >= stamps[-1] - round(self.span * 1e9)))
-            self._signals[signal] = _Samples(stamps[begin:], values[begin:])
+            self._signals[signal] = Samples(stamps[begin:], values[begin:])
             self._arrivals[signal] = self._clock()
             self._count += 1
 

@@ -20,9 +20,10 @@ from zoneinfo import ZoneInfo
 from valve_friction_ros.dashboard.context import zone_of
 from valve_friction_ros.dashboard.history_cache import Sparkline
 from valve_friction_ros.dashboard.live_state import Drift, Heard, Quantity, ValveView
-from valve_friction_ros.health import Level, Ratio, StatusSignal
+from valve_friction_ros.health.comparison import Ratio
+from valve_friction_ros.health.levels import Level, StatusSignal
 from valve_friction_ros.history import HistoryEntry
-from valve_friction_ros.identification import SLIDING, UNITS
+from valve_friction_ros.identification.settings import SLIDING, UNITS
 from valve_friction_ros.outside_text import printable
 from valve_friction_ros.streams import utc
 from valve_friction_ros.wording import number_and_width, numbered, with_width

@@ -340,17 +340,10 @@ def _epochs_of(time: NDArray[np.float64], levels: NDArray[np.intp]) -> NDArray[n
     return np.asarray(number + (_MOST_EPOCHS + 1) * levels, dtype=np.intp)
 
 
-def design_of(
-    moves: Moves,
-    frictions: NDArray[np.intp],
-    scales: Scales,
-    steps: tuple[NDArray[np.intp], float],
-) -> Design:
-    """Return the rows of moves, with one friction per number in `frictions`.
-
-    `steps` are the levels of the preload, and the largest step between them (`levels_of`).
-    """
-    levels, largest_step = steps
+def design_of(moves: Moves, frictions: NDArray[np.intp]) -> tuple[Design, Scales]:
+    """Return the rows of moves, with one friction per number in `frictions`, and their scales."""
+    levels, largest_step = levels_of(moves)
+    scales = scales_of(moves, levels)
     kinds, epochs = np.unique(_epochs_of(moves.time, levels), return_inverse=True)
     way, away = moves.direction, moves.place - scales.place
     dense = np.zeros((len(moves), PRELOAD + 1))
@@ -359,7 +352,7 @@ def design_of(
     dense[:, SPEED] = way * (np.minimum(moves.speed, _FASTEST * speed) - speed)
     dense[:, ALONG] = way * away
     weight = moves.distance / float(np.mean(moves.distance)) * _is_steady(levels)
-    return Design(
+    design = Design(
         dense,
         epochs.astype(np.intp),
         frictions,
@@ -371,6 +364,7 @@ def design_of(
         int(frictions.max()) + 1,
         largest_step,
     )
+    return design, scales
 
 
 def with_onsets(design: Design, moves: Moves, place: float) -> Design:
@@ -519,10 +513,8 @@ def balance_of(
     ways = [int(np.sum(moves.direction == way)) for way in (-1, 1)]
     if min(ways) < FEWEST_MOVES or count < FEWEST_BLOCKS:
         return None
-    steps = levels_of(moves)
-    scales = scales_of(moves, steps[0])
+    design, scales = design_of(moves, np.zeros(len(moves), dtype=np.intp))
     scale, place, speed = scales
-    design = design_of(moves, np.zeros(len(moves), dtype=np.intp), scales, steps)
     precision = priors(design, scales, moves, travel)
     precision[SLIDING] = 0.0
     design = with_onsets(design, moves, place)

@@ -35,16 +35,15 @@ from valve_friction_ros.evidence.balance import (
     balance_of,
     blocks_of,
     design_of,
-    levels_of,
     priors,
     robust,
-    scales_of,
 )
 from valve_friction_ros.evidence.moves import Move, Moves
-from valve_friction_ros.identification import TIMING_UNCERTAINTY, IdentificationSettings, Parameter
+from valve_friction_ros.identification.settings import TIMING_UNCERTAINTY, IdentificationSettings
 from valve_friction_ros.identification.trust.uncertainty import MEDIAN_MAGNITUDE
 from valve_friction_ros.identification.trust.verdict import (
     WEAK_SHARE,
+    Parameter,
     Verdict,
     calibrated,
     calibration_share,
@@ -89,9 +88,7 @@ def series_of(moves: Moves, travel: float) -> Series | None:
     count = int(blocks[-1]) + 1 if len(moves) else 0
     if count < 2:
         return None
-    steps = levels_of(moves)
-    scales = scales_of(moves, steps[0])
-    design = design_of(moves, blocks, scales, steps)
+    design, scales = design_of(moves, blocks)
     precision = priors(design, scales, moves, travel)
     values, weight = robust(design, design.force, precision, scales.friction)
     covariance = design.normal(weight, precision).friction_covariance()
@@ -166,7 +163,7 @@ def splits_of(series: Series) -> tuple[int, tuple[Split, ...]]:
     found = _steps(series, 0, count)
     edges = [0, *(block for block, size in found if _is_large(size)), count]
     parts = zip(edges, edges[1:], edges[2:], strict=False)
-    splits = (_split(_Part.of(series, begin, end), place) for begin, place, end in parts)
+    splits = (_split(_Part(series, begin, end), place) for begin, place, end in parts)
     return (found[-1][0] if found else 0), tuple(splits)
 
 
@@ -178,7 +175,7 @@ def _steps(series: Series, begin: int, end: int) -> list[tuple[int, float]]:
     """Return the first block after each step between two blocks, and its size as a ratio."""
     if end - begin < 2 * _LEAST_BLOCKS or not np.all(series.friction[begin:end] > 0):
         return []
-    step = _step(_Part.of(series, begin, end))
+    step = _step(_Part(series, begin, end))
     if step is None:
         return []
     if before := [one for one in _steps(series, begin, step[0]) if _is_large(one[1])]:
@@ -186,34 +183,43 @@ def _steps(series: Series, begin: int, end: int) -> list[tuple[int, float]]:
     return [step, *_steps(series, step[0], end)]
 
 
-@dataclass(frozen=True, eq=False)
 class _Part:
     """Some blocks of a series, from `begin` on, and a step of friction at each place in them.
 
     `old` and `new` are the means before and from each place on, N; `statistics` are their distances
-    in standard errors. The places are 1, 2, …
+    in standard errors. The places are 1, 2, … All use sums over parts of the covariance, so
+    hundreds of places cost little.
     """
 
-    series: Series
-    begin: int
-    contrasts: "_Contrasts"
-    old: NDArray[np.float64]
-    new: NDArray[np.float64]
-    statistics: NDArray[np.float64]
-
-    @classmethod
-    def of(cls, series: Series, begin: int, end: int) -> "_Part":
-        """Return the blocks from `begin` up to `end`."""
+    def __init__(self, series: Series, begin: int, end: int) -> None:
         friction, covariance = series.friction[begin:end], series.covariance[begin:end, begin:end]
-        contrasts = _Contrasts(friction, covariance, _between(friction))
+        self.series, self.begin, self.count = series, begin, friction.size
+        self._sums = np.concatenate(([0.0], np.cumsum(friction)))
+        self._parts = np.zeros((friction.size + 1, friction.size + 1))
+        self._parts[1:, 1:] = np.cumsum(np.cumsum(covariance, axis=0), axis=1)
+        self._scatter = _scatter_of(friction)
         places = np.arange(1, friction.size)
-        old, new, errors = contrasts.between(places, places)
-        return cls(series, begin, contrasts, old, new, np.abs(new - old) / errors)
+        self.old, self.new, errors = self.means(places, places)
+        self.statistics = np.abs(self.new - self.old) / errors
+
+    def means(
+        self, ends: NDArray[np.intp], begins: NDArray[np.intp]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Return mean before each end, mean from each begin on, and error of the difference, N."""
+        sums, parts, last = self._sums, self._parts, self._sums.size - 1
+        before, after = ends, last - begins
+        upper = parts[ends, ends]
+        lower = parts[last, last] - 2.0 * parts[last, begins] + parts[begins, begins]
+        mixed = parts[ends, last] - parts[ends, begins]
+        variance = upper / before**2 + lower / after**2 - 2.0 * mixed / (before * after)
+        scattered = self._scatter**2 * (1.0 / before + 1.0 / after)
+        errors = np.sqrt(np.maximum(variance, 0.0) + scattered)
+        return sums[ends] / before, (sums[last] - sums[begins]) / after, errors
 
 
 def _step(part: _Part) -> tuple[int, float] | None:
     """Return the first block after the step of a part, and its size; None without a sure step."""
-    count = part.statistics.size + 1
+    count = part.count
     inner = slice(_LEAST_BLOCKS - 1, count - _LEAST_BLOCKS)
     likeliest = inner.start + int(np.argmax(part.statistics[inner]))
     size = float(part.new[likeliest] / part.old[likeliest])
@@ -234,9 +240,8 @@ def _split(part: _Part, block: int) -> Split:
     (possible,) = np.nonzero(statistics**2 >= statistics[best] ** 2 - _DATE)
     first, last = int(possible[0]) + begin, int(possible[-1]) + begin + 1
     # The change lies within a block next to the place, so the ratio uses neither of the two.
-    count = statistics.size + 1
-    ends, begins = (np.array([min(max(best + one, 1), count - 1)]) for one in (0, 2))
-    found = part.contrasts.between(ends, begins)
+    ends, begins = (np.array([min(max(best + one, 1), part.count - 1)]) for one in (0, 2))
+    found = part.means(ends, begins)
     before, after, error = (float(one[0]) for one in found)
     ratio, share = after / before, 2.0 * error / min(before, after)
     return Split(
@@ -250,36 +255,7 @@ def _split(part: _Part, block: int) -> Split:
     )
 
 
-class _Contrasts:
-    """Means of the blocks before one place and from another place on, and their difference.
-
-    All use sums over parts of the covariance, so hundreds of places cost little.
-    """
-
-    def __init__(
-        self, friction: NDArray[np.float64], covariance: NDArray[np.float64], between: float
-    ) -> None:
-        self._sums = np.concatenate(([0.0], np.cumsum(friction)))
-        self._parts = np.zeros((friction.size + 1, friction.size + 1))
-        self._parts[1:, 1:] = np.cumsum(np.cumsum(covariance, axis=0), axis=1)
-        self._between = between
-
-    def between(
-        self, ends: NDArray[np.intp], begins: NDArray[np.intp]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Return mean before each end, mean from each begin on, and error of the difference, N."""
-        sums, parts, last = self._sums, self._parts, self._sums.size - 1
-        before, after = ends, last - begins
-        upper = parts[ends, ends]
-        lower = parts[last, last] - 2.0 * parts[last, begins] + parts[begins, begins]
-        mixed = parts[ends, last] - parts[ends, begins]
-        variance = upper / before**2 + lower / after**2 - 2.0 * mixed / (before * after)
-        scattered = self._between**2 * (1.0 / before + 1.0 / after)
-        errors = np.sqrt(np.maximum(variance, 0.0) + scattered)
-        return sums[ends] / before, (sums[last] - sums[begins]) / after, errors
-
-
-def _between(friction: NDArray[np.float64]) -> float:
+def _scatter_of(friction: NDArray[np.float64]) -> float:
     """Return the standard deviation of a block, N, from differences of successive blocks."""
     steps = np.abs(np.diff(friction))
     scatter = float(np.median(steps)) / (MEDIAN_MAGNITUDE * math.sqrt(2.0))

@@ -20,7 +20,8 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
 
 from valve_friction_ros.figures.panels import COLOURS, dress, labelled_in, legend_above
-from valve_friction_ros.health import DatedNumber, friction_name
+from valve_friction_ros.health.comparison import friction_name
+from valve_friction_ros.health.measured import DatedNumber
 from valve_friction_ros.history import (
     LIMIT_NAMES,
     Trend,
@@ -30,7 +31,8 @@ from valve_friction_ros.history import (
     friction_of,
     trended,
 )
-from valve_friction_ros.identification import SLIDING, Verdict
+from valve_friction_ros.identification.settings import SLIDING
+from valve_friction_ros.identification.trust.verdict import Verdict
 from valve_friction_ros.outside_text import printable
 from valve_friction_ros.streams import DAY
 from valve_friction_ros.usage import BINS, UsedDay, ValveUsage

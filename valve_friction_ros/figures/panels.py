@@ -22,15 +22,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 
-from valve_friction_ros.identification import (
-    Curve,
-    Drawing,
-    Panel,
-    Parameter,
-    Result,
-    StemComparison,
-)
-from valve_friction_ros.model import Recording
+from valve_friction_ros.identification.drawing import Curve, Drawing, Panel
+from valve_friction_ros.identification.result import Result, StemComparison
+from valve_friction_ros.identification.trust.verdict import Parameter
+from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.records.files import write_whole
 from valve_friction_ros.wording import with_width
 

@@ -30,18 +30,15 @@ from valve_friction_ros.figures.panels import (
     thinned,
     titled_figure,
 )
-from valve_friction_ros.health import dead_band
-from valve_friction_ros.identification import (
-    SLIDING,
-    Drawing,
-    Parameter,
-    Result,
-    StemComparison,
-    Validation,
-)
-from valve_friction_ros.model import Recording, Valve
-from valve_friction_ros.planning import StrokePlan
-from valve_friction_ros.planning.search import moved
+from valve_friction_ros.health.diagnosis import dead_band
+from valve_friction_ros.identification.drawing import Drawing
+from valve_friction_ros.identification.result import Result, StemComparison
+from valve_friction_ros.identification.settings import SLIDING
+from valve_friction_ros.identification.steps.validation import Validation
+from valve_friction_ros.identification.trust.verdict import Parameter
+from valve_friction_ros.model.recording import Recording
+from valve_friction_ros.model.valve import Valve
+from valve_friction_ros.planning.search import StrokePlan, moved
 from valve_friction_ros.wording import percentage, with_width
 
 

@@ -29,16 +29,10 @@ from valve_friction_ros.fleet.rows import (
     report_name,
     result_cells,
 )
-from valve_friction_ros.health import (
-    Alarm,
-    AlarmKind,
-    Baseline,
-    Diagnosis,
-    FrictionHold,
-    FrictionLimits,
-)
-from valve_friction_ros.health.alarm_conditions import ALARM_OF_SIDE, shown_by
-from valve_friction_ros.health.alarms import NO_CONDITION, Condition
+from valve_friction_ros.health.alarm_conditions import ALARM_OF_SIDE, FrictionHold, shown_by
+from valve_friction_ros.health.alarms import NO_CONDITION, Alarm, AlarmKind, Condition
+from valve_friction_ros.health.baseline import Baseline
+from valve_friction_ros.health.diagnosis import Diagnosis, FrictionLimits
 from valve_friction_ros.health.friction_monitor import (
     MonitorSettings,
     diagnose_outcome,
@@ -57,8 +51,11 @@ from valve_friction_ros.history import (
     read_alarms,
 )
 from valve_friction_ros.history.entry import Span, kept_of, settings_text
-from valve_friction_ros.identification import IdentificationSettings, RefusalError, Result
-from valve_friction_ros.model import Recording, Valve
+from valve_friction_ros.identification.refusal import RefusalError
+from valve_friction_ros.identification.result import Result
+from valve_friction_ros.identification.settings import IdentificationSettings
+from valve_friction_ros.model.recording import Recording
+from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.records.files import on_disk
 from valve_friction_ros.records.recorded_valve import RecordedValve
 from valve_friction_ros.records.recordings import ReadingOptions, read_recordings

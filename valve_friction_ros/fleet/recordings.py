@@ -22,11 +22,12 @@ from typing import Any
 
 import yaml
 
-from valve_friction_ros.health import Baseline, Measured, SlidingFriction
+from valve_friction_ros.health.baseline import Baseline, SlidingFriction
+from valve_friction_ros.health.measured import Measured
 from valve_friction_ros.health.valve_numbers import COMPARED, IDENTIFIED_ONLY, fit_numbers
 from valve_friction_ros.history.place import BESIDE_ENDINGS
-from valve_friction_ros.identification import Verdict
 from valve_friction_ros.identification.settings import column_suffix
+from valve_friction_ros.identification.trust.verdict import Verdict
 from valve_friction_ros.outside_text import as_read, nearest, resembling
 from valve_friction_ros.records.bags.topics import is_bag
 from valve_friction_ros.records.columns import Columns

@@ -20,17 +20,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from valve_friction_ros.health import (
-    Diagnosis,
-    Finding,
-    FrictionLimits,
-    Level,
-    StatusSignal,
-    by_severity,
-    dead_band,
-)
-from valve_friction_ros.identification import PARAMETER_UNITS, Result, parameter_columns, plain
-from valve_friction_ros.model import Recording
+from valve_friction_ros.health.diagnosis import Diagnosis, FrictionLimits, dead_band
+from valve_friction_ros.health.levels import Finding, Level, StatusSignal, by_severity
+from valve_friction_ros.identification.rendering import parameter_columns, plain
+from valve_friction_ros.identification.result import Result
+from valve_friction_ros.identification.settings import PARAMETER_UNITS
+from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.records.files import write_whole
 from valve_friction_ros.reports.identified_record import what_to_do
 

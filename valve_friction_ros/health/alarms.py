@@ -27,7 +27,7 @@ from typing import NamedTuple
 
 from valve_friction_ros.health.levels import Level, StatusSignal
 from valve_friction_ros.outside_text import printable
-from valve_friction_ros.wording import utc_minute, utc_second
+from valve_friction_ros.wording import alarm_advice, utc_minute, utc_second
 
 
 class AlarmKind(Enum):
@@ -223,6 +223,11 @@ class Alarm:
     def is_told(self) -> bool:
         """Whether people are notified of it: it is active and not suppressed."""
         return self.is_active and not self.state.is_suppressed
+
+    @property
+    def advice(self) -> str:
+        """What to do about it, as a sentence."""
+        return alarm_advice(self.kind.value, self.condition.level.name)
 
     def __str__(self) -> str:
         """Return kind, state and end of a suppression on one line."""

@@ -16,7 +16,10 @@ from enum import Enum
 
 from valve_friction_ros.health.measured import Measured
 from valve_friction_ros.health.valve_numbers import valve_numbers
-from valve_friction_ros.identification import SLIDING, Parameter, RefusalError, Result
+from valve_friction_ros.identification.refusal import RefusalError
+from valve_friction_ros.identification.result import Result
+from valve_friction_ros.identification.settings import SLIDING
+from valve_friction_ros.identification.trust.verdict import Parameter
 from valve_friction_ros.model.checks import require_non_negative, require_positive
 from valve_friction_ros.wording import (
     MORE_STROKES,

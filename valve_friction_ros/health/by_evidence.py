@@ -14,7 +14,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from valve_friction_ros.evidence import Evidence, FrictionChange
+from valve_friction_ros.evidence.estimate import Evidence, FrictionChange
 from valve_friction_ros.health.baseline import (
     GOOD_SHARE,
     Baseline,
@@ -25,7 +25,8 @@ from valve_friction_ros.health.baseline import (
 )
 from valve_friction_ros.health.comparison import Ratio, compared
 from valve_friction_ros.health.diagnosis import Diagnosis, FrictionLimits, FrictionState, against
-from valve_friction_ros.identification import SLIDING, RefusalError
+from valve_friction_ros.identification.refusal import RefusalError
+from valve_friction_ros.identification.settings import SLIDING
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.wording import Code, Statement, percentage, said
 

@@ -22,8 +22,9 @@ from typing import NamedTuple
 from valve_friction_ros.health.baseline import Baseline, SlidingFriction
 from valve_friction_ros.health.measured import Measured
 from valve_friction_ros.health.valve_numbers import SHARED, SURE_SPRING
-from valve_friction_ros.identification import SLIDING, SPEED_EXPONENT, Parameter, Verdict
-from valve_friction_ros.identification.trust.uncertainty import NORMAL_QUANTILE
+from valve_friction_ros.identification.settings import SLIDING
+from valve_friction_ros.identification.trust.uncertainty import NORMAL_QUANTILE, SPEED_EXPONENT
+from valve_friction_ros.identification.trust.verdict import Parameter, Verdict
 from valve_friction_ros.wording import Code, Statement, said, sentence
 
 _ALIKE = 0.9

@@ -13,7 +13,7 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum, auto
-from typing import Any, Protocol, TypeAlias
+from typing import Any, TypeAlias
 
 from valve_friction_ros.health.baseline import Baseline
 from valve_friction_ros.health.comparison import Ratio, carried, compared
@@ -27,7 +27,10 @@ from valve_friction_ros.health.levels import (
 )
 from valve_friction_ros.health.measured import Measured
 from valve_friction_ros.health.valve_numbers import comparable_numbers
-from valve_friction_ros.identification import SLIDING, Parameter, Result, plain
+from valve_friction_ros.identification.rendering import plain
+from valve_friction_ros.identification.result import Result
+from valve_friction_ros.identification.settings import SLIDING
+from valve_friction_ros.identification.trust.verdict import Parameter
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.wording import Code, Statement, said, sentence
 
@@ -128,11 +131,6 @@ class FrictionState(Enum):
     def side(self) -> Side | None:
         """The side to which the friction has clearly moved; None if that is not sure."""
         return _MEANINGS[self][2]
-
-    @property
-    def is_uncertain(self) -> bool:
-        """Whether the friction is beyond a limit, but possibly unchanged."""
-        return self is FrictionState.UNCLEAR
 
     @property
     def level(self) -> Level:
@@ -292,43 +290,44 @@ class Diagnosis:
         return f"{'unknown' if is_unknown else self.level.name}: {self.message}"
 
 
-class EarlierEstimate(Protocol):
-    """A stored estimate with its diagnosis."""
+@dataclass(frozen=True, kw_only=True)
+class EarlierEstimate:
+    """A stored estimate with its diagnosis.
+
+    Attributes
+    ----------
+    time : int
+        When the identification ended, ns since 1970 (UTC) by the node's clock.
+    diagnosis : Diagnosis
+        The diagnosis that the operator saw.
+    limits : FrictionLimits
+        The limits in force.
+    baseline : Baseline or None
+        The baseline in force.
+    parameters : mapping of str to Parameter
+        The identified parameters.
+    sliding_speed : float
+        Speed to which the sliding friction applies, m/s; nan if unknown.
+    numbers : mapping of str to Measured
+        Other measured numbers of the valve (`valve_numbers`).
+    """
+
+    time: int
+    diagnosis: Diagnosis
+    limits: FrictionLimits
+    baseline: Baseline | None
+    parameters: Mapping[str, Parameter] = field(default_factory=dict)
+    sliding_speed: float = math.nan
+    numbers: Mapping[str, Measured] = field(default_factory=dict)
 
     @property
-    def parameters(self) -> Mapping[str, Parameter]:
-        """Parameters by name."""
-
-    @property
-    def values(self) -> Mapping[str, float]:
-        """Their values."""
-
-    @property
-    def sliding_speed(self) -> float:
-        """Speed of the sliding friction, m/s."""
-
-    @property
-    def time(self) -> int:
-        """Time of identification, ns since 1970 (UTC)."""
-
-    @property
-    def diagnosis(self) -> Diagnosis:
-        """The diagnosis at that time."""
-
-    @property
-    def baseline(self) -> Baseline | None:
-        """The baseline at that time."""
-
-    @property
-    def limits(self) -> FrictionLimits:
-        """The limits at that time."""
-
-    @property
-    def numbers(self) -> Mapping[str, Measured]:
-        """Further measured numbers of the valve."""
+    def values(self) -> dict[str, float]:
+        """Values of the parameters by name."""
+        return {name: parameter.value for name, parameter in self.parameters.items()}
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain values with the keys of `Result.to_dict`."""
+        raise NotImplementedError
 
 
 Estimate: TypeAlias = Result | EarlierEstimate
@@ -565,7 +564,7 @@ def against(
     """
     state = friction_state(ratio, limits)
     statement = said(
-        Code.COMPARED_AGAIN if state.is_uncertain else Code.COMPARED,
+        Code.COMPARED_AGAIN if state is FrictionState.UNCLEAR else Code.COMPARED,
         state=state.name,
         what=ratio.friction,
         ratio=ratio.interval,

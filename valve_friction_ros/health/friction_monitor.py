@@ -39,15 +39,14 @@ from valve_friction_ros.health.valve_numbers import (
     numbers_of_refused,
     valve_numbers,
 )
-from valve_friction_ros.identification import (
+from valve_friction_ros.identification.methods import method_named
+from valve_friction_ros.identification.refusal import LittleMotionError, RefusalError
+from valve_friction_ros.identification.result import Result
+from valve_friction_ros.identification.settings import (
     DEFAULT_METHOD,
     IdentificationSettings,
-    RefusalError,
-    Result,
     current_name,
-    method_named,
 )
-from valve_friction_ros.identification.refusal import LittleMotionError
 from valve_friction_ros.model.checks import require_positive
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve

@@ -26,7 +26,7 @@ from valve_friction_ros.health.measured import (
     valve_changes,
 )
 from valve_friction_ros.health.valve_numbers import valve_numbers
-from valve_friction_ros.identification import Result
+from valve_friction_ros.identification.result import Result
 from valve_friction_ros.identification.trust.stated import is_atmosphere
 from valve_friction_ros.model.drive import Drive
 from valve_friction_ros.model.valve import Valve

@@ -19,17 +19,10 @@ import scipy
 from numpy.typing import NDArray
 
 from valve_friction_ros.health.measured import DIFFERENCES, Measured
-from valve_friction_ros.identification import (
-    COMPARABLE,
-    IMPERFECTIONS_FOUND,
-    SPEED_EXPONENT,
-    IdentificationSettings,
-    Parameter,
-    RefusalError,
-    Result,
-    Verdict,
-)
-from valve_friction_ros.identification.refusal import LittleMotionError
+from valve_friction_ros.identification.drawing import IMPERFECTIONS_FOUND
+from valve_friction_ros.identification.refusal import LittleMotionError, RefusalError
+from valve_friction_ros.identification.result import Result
+from valve_friction_ros.identification.settings import IdentificationSettings
 from valve_friction_ros.identification.trust.excitation import (
     require_drive,
     require_motion,
@@ -39,6 +32,8 @@ from valve_friction_ros.identification.trust.excitation import (
     require_within_travel,
 )
 from valve_friction_ros.identification.trust.plausible_units import require_plausible_units
+from valve_friction_ros.identification.trust.uncertainty import COMPARABLE, SPEED_EXPONENT
+from valve_friction_ros.identification.trust.verdict import Parameter, Verdict
 from valve_friction_ros.model.recording import Recording, StampedSignal
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.signals import (

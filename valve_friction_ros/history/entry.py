@@ -20,20 +20,16 @@ from typing import Any, NamedTuple
 from valve_friction_ros import __version__
 from valve_friction_ros.health.baseline import Baseline
 from valve_friction_ros.health.comparison import carried
-from valve_friction_ros.health.diagnosis import Diagnosis, FrictionLimits
+from valve_friction_ros.health.diagnosis import EarlierEstimate
 from valve_friction_ros.health.friction_monitor import FrictionMonitor, MonitorSettings
 from valve_friction_ros.health.levels import Level
 from valve_friction_ros.health.measured import DatedNumber, Measured
 from valve_friction_ros.health.valve_numbers import RefusedRecordError
-from valve_friction_ros.identification import (
-    SLIDING,
-    Parameter,
-    RefusalError,
-    Result,
-    Verdict,
-    parameter_mapping,
-    plain,
-)
+from valve_friction_ros.identification.refusal import RefusalError
+from valve_friction_ros.identification.rendering import parameter_mapping, plain
+from valve_friction_ros.identification.result import Result
+from valve_friction_ros.identification.settings import SLIDING
+from valve_friction_ros.identification.trust.verdict import Parameter, Verdict
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.streams.record_buffer import Snapshot
 
@@ -178,30 +174,22 @@ def _frictions_of(name: str, baseline: Baseline | None) -> dict[str, Any]:
     }
 
 
-@dataclass(frozen=True)
-class HistoryEntry:
-    """One identification, successful or refused.
+@dataclass(frozen=True, kw_only=True)
+class HistoryEntry(EarlierEstimate):
+    """One identification, successful or refused: an `EarlierEstimate` and what is stored with it.
+
+    The parameters of a refusal are empty.
 
     Attributes
     ----------
-    time : int
-        When it ended, ns since 1970 (UTC) by the node's clock.
     valve : KeptValve
         The valve.
     span : Span or None
         Time of its record; None for an empty buffer.
     method : str
         The method actually used, never an automatic choice.
-    diagnosis : Diagnosis
-        The diagnosis that the operator saw.
-    limits : FrictionLimits
-        The limits in force.
-    baseline : Baseline or None
-        The baseline in force.
     settings : str
         Settings of the identification, a JSON object (`settings_text`).
-    parameters : mapping of str to Parameter
-        The identified parameters; empty for a refusal.
     fit : Fit
         How well the model reproduces the record.
     warnings : tuple of str
@@ -210,38 +198,22 @@ class HistoryEntry:
         Cause of the refusal; empty for a success.
     version : str
         Version of this software.
-    sliding_speed : float
-        Speed to which the sliding friction applies, m/s; nan if unknown.
-    numbers : mapping of str to Measured
-        Other measured numbers of the valve (`valve_numbers`).
     """
 
-    time: int
     valve: KeptValve
     span: Span | None
     method: str
-    diagnosis: Diagnosis
-    limits: FrictionLimits
-    baseline: Baseline | None
     settings: str
-    parameters: Mapping[str, Parameter] = field(default_factory=dict)
     fit: Fit = field(default_factory=Fit)
     warnings: tuple[str, ...] = ()
     refusal: str = ""
     version: str = __version__
-    sliding_speed: float = math.nan
-    numbers: Mapping[str, Measured] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Refuse an entry that is neither or both of success and refusal."""
         if bool(self.parameters) == bool(self.refusal):
             raise ValueError("an entry holds either parameters or the reason of a refusal")
         object.__setattr__(self, "parameters", MappingProxyType(dict(self.parameters)))
-
-    @property
-    def values(self) -> dict[str, float]:
-        """Values of the parameters by name."""
-        return {name: parameter.value for name, parameter in self.parameters.items()}
 
     @property
     def friction(self) -> Parameter | None:

@@ -42,7 +42,7 @@ from valve_friction_ros.history.rows import (
     valve_id,
 )
 from valve_friction_ros.history.tables import joined, of_valve
-from valve_friction_ros.identification import FORMER_METHODS, SLIDING
+from valve_friction_ros.identification.settings import FORMER_METHODS, SLIDING
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.streams import END_OF_TIME
 

@@ -25,7 +25,8 @@ import numpy as np
 import sqlalchemy as sa
 from sqlalchemy.engine import Connection, RowMapping
 
-from valve_friction_ros.evidence import FrictionChange, Move
+from valve_friction_ros.evidence.estimate import FrictionChange
+from valve_friction_ros.evidence.moves import Move
 from valve_friction_ros.health.baseline import Baseline, SlidingFriction
 from valve_friction_ros.health.comparison import Ratio
 from valve_friction_ros.health.diagnosis import (
@@ -48,14 +49,10 @@ from valve_friction_ros.history.entry import (
     Span,
 )
 from valve_friction_ros.history.tables import joined, put
-from valve_friction_ros.identification import (
-    PARAMETER_UNITS,
-    SPEED_EXPONENT,
-    Parameter,
-    Verdict,
-    current_name,
-    plain,
-)
+from valve_friction_ros.identification.rendering import plain
+from valve_friction_ros.identification.settings import PARAMETER_UNITS, current_name
+from valve_friction_ros.identification.trust.uncertainty import SPEED_EXPONENT
+from valve_friction_ros.identification.trust.verdict import Parameter, Verdict
 from valve_friction_ros.model.drive import Drive
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve

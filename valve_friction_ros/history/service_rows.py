@@ -19,9 +19,10 @@ from typing import Any, NamedTuple
 import sqlalchemy as sa
 from sqlalchemy.engine import Connection
 
-from valve_friction_ros.evidence import MOST_MOVES, FrictionChange, Move
-from valve_friction_ros.health import Reference, SlidingFriction
-from valve_friction_ros.health.baseline import Baseline
+from valve_friction_ros.evidence.estimate import MOST_MOVES, FrictionChange
+from valve_friction_ros.evidence.moves import Move
+from valve_friction_ros.health.baseline import Baseline, SlidingFriction
+from valve_friction_ros.health.by_evidence import Reference
 from valve_friction_ros.health.friction_monitor import MonitorSettings
 from valve_friction_ros.health.levels import Level
 from valve_friction_ros.history import tables

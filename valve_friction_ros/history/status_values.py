@@ -11,10 +11,13 @@
 
 import math
 from collections.abc import Mapping
-from typing import Any
 
-from valve_friction_ros.health import Alarm, AlarmKind, AlarmState, Baseline, Ratio
+from valve_friction_ros.health.alarms import Alarm, AlarmKind, AlarmState
+from valve_friction_ros.health.baseline import Baseline
+from valve_friction_ros.health.comparison import Ratio
+from valve_friction_ros.health.diagnosis import Estimate, dead_band, dead_band_half_width
 from valve_friction_ros.history.trend import Trend
+from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.streams import utc, utc_day, utc_second
 
 
@@ -44,12 +47,9 @@ _EVIDENCE_UNITS = {
 }
 
 
-def result_values(shown: Mapping[str, Any], band: float, half_width: float) -> dict[str, str]:
-    """Return the status values of a result, or of its history entry, given as `to_dict`.
-
-    The dead band and the half width of its interval are shares of the travel.
-    """
-    values: dict[str, str] = {}
+def result_values(estimate: Estimate, valve: Valve) -> dict[str, str]:
+    """Return the status values of a result, or of its history entry."""
+    shown, values = estimate.to_dict(), dict[str, str]()
     for name, parameter in shown["parameters"].items():
         unit = parameter["unit"]
         values[f"{name} [{unit}]"] = number_text(parameter["value"])
@@ -60,8 +60,9 @@ def result_values(shown: Mapping[str, Any], band: float, half_width: float) -> d
         if parameter["published"] is not None:
             values[f"{name} published [{unit}]"] = number_text(parameter["published"])
     values["sliding_speed [m/s]"] = number_text(shown["sliding_speed"])
-    if math.isfinite(band):
+    if math.isfinite(band := dead_band(estimate, valve)):
         values["dead_band [%]"] = number_text(100 * band)
+        half_width = dead_band_half_width(estimate, valve)
         values["dead_band half width [%]"] = number_text(100 * half_width)
     if shown["rms"] is not None:
         values["fit [%]"] = number_text(100 * shown["fit"])

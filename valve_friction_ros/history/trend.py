@@ -29,7 +29,7 @@ from valve_friction_ros.history.entry import (
     KeptValve,
     trended,
 )
-from valve_friction_ros.identification import SLIDING
+from valve_friction_ros.identification.settings import SLIDING
 from valve_friction_ros.identification.trust.uncertainty import student_quantile
 from valve_friction_ros.response import ResponseSummary, summarised
 from valve_friction_ros.streams import DAY, utc

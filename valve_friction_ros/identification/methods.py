@@ -25,15 +25,10 @@ from valve_friction_ros.identification.settings import (
     current_name,
 )
 from valve_friction_ros.identification.signature import force_balance as signature
-from valve_friction_ros.model import (
-    BENCH_VALVE,
-    LOW_FRICTION,
-    Recording,
-    SineWave,
-    compile_kernels,
-    simulate,
-)
 from valve_friction_ros.model.checks import A_VALVE, require_type
+from valve_friction_ros.model.excitations import BENCH_VALVE, LOW_FRICTION, SineWave
+from valve_friction_ros.model.recording import Recording
+from valve_friction_ros.model.simulation import compile_kernels, simulate
 from valve_friction_ros.model.valve import Valve
 
 

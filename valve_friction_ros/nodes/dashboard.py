@@ -43,7 +43,6 @@ from valve_friction_ros.dashboard import (
 from valve_friction_ros.dashboard.accounts import Access, accounts_from
 from valve_friction_ros.dashboard.context import INSTALL, DashboardContext
 from valve_friction_ros.dashboard.history_cache import HistoryCache
-from valve_friction_ros.dashboard.live_state import Sources
 from valve_friction_ros.dashboard.live_strip import LiveStrip
 from valve_friction_ros.history import server_from
 from valve_friction_ros.nodes.plumbing.managed_node import ManagedNode
@@ -58,6 +57,7 @@ from valve_friction_ros.nodes.plumbing.running import WRONG_REQUESTS, StopReques
 from valve_friction_ros.nodes.plumbing.worker import Companion
 from valve_friction_ros.nodes.service_call import LateError, TriggerCall, UnansweredError
 from valve_friction_ros.outside_text import printable
+from valve_friction_ros.records.bags.topics import StreamNames
 from valve_friction_ros.settings import NODES
 
 _SPAN = 60.0
@@ -68,20 +68,20 @@ _SPAN = 60.0
 class _Watch:
     strip: LiveStrip
     lookers: int = 0
-    sources: Sources = field(default_factory=Sources)
+    sources: StreamNames = field(default_factory=StreamNames)
     streams: tuple[PolledSubscription, ...] = ()
 
-    def follow(self, node: PolledNode, sources: Sources) -> None:
+    def follow(self, node: PolledNode, sources: StreamNames) -> None:
         """Subscribe to the topics of the valve, and again whenever they change."""
         if sources != self.sources:
             self.end()
             self.sources, self.strip.trouble = sources, ""
-            if sources.pressure_topic and sources.stem_topic:
+            if sources.pressure and sources.stem:
                 self._begin(node)
 
     def _begin(self, node: PolledNode) -> None:
         """Subscribe to both topics or to neither: their names come from outside."""
-        topics = (self.sources.pressure_topic, self.sources.stem_topic)
+        topics = self.sources[:2]
         for kind, topic in zip((FluidPressure, JointState), topics, strict=True):
             try:
                 made = PolledSubscription(node, kind, topic, watched(), raw=True)
@@ -99,7 +99,7 @@ class _Watch:
 
     def end(self) -> None:
         self._destroy()
-        self.sources = Sources()
+        self.sources = StreamNames()
 
     def take(self) -> None:
         """Pass the received samples to the strip; skip malformed messages."""
@@ -128,7 +128,7 @@ class WatchedSignals:
         Returns the topics of a valve for the name of its identifier.
     """
 
-    def __init__(self, sources_of: Callable[[str], Sources]) -> None:
+    def __init__(self, sources_of: Callable[[str], StreamNames]) -> None:
         self._sources_of = sources_of
         self._lock = threading.Lock()
         self._watches: dict[str, _Watch] = {}
@@ -384,9 +384,9 @@ class Dashboard(ManagedNode):
         self.opened.callback(self.calls.rest, self)
         self.opened.callback(self.signals.rest)
 
-    def _sources_of(self, identifier: str) -> Sources:
+    def _sources_of(self, identifier: str) -> StreamNames:
         heard = self.plant.valve(identifier, time.monotonic())
-        return Sources() if heard is None else heard.view.sources
+        return StreamNames() if heard is None else heard.view.sources
 
     def poll(self) -> None:
         """Process the diagnostics received and the requests of the pages."""

@@ -22,7 +22,7 @@ from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.validate_namespace import validate_namespace
 
-from valve_friction_ros.identification import RefusalError
+from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.nodes.identifier.node import Identifier
 from valve_friction_ros.nodes.identifier.status import EstimateTopic, stuck_status
 from valve_friction_ros.nodes.identifier.workers import running_workers

@@ -20,15 +20,15 @@ from typing import Any
 import numpy as np
 from sensor_msgs.msg import FluidPressure
 
-from valve_friction_ros.model import (
+from valve_friction_ros.model.excitations import (
     Excitation,
     IsaSteps,
     SampledPressure,
     SineWave,
     SquareWave,
     TriangleWave,
-    converter_response,
 )
+from valve_friction_ros.model.recording import converter_response
 from valve_friction_ros.nodes.plumbing.messages import time_message
 from valve_friction_ros.nodes.plumbing.parameters import declare_parameters, values_of
 from valve_friction_ros.nodes.plumbing.polled_node import PacedNode

@@ -31,8 +31,8 @@ from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 from std_srvs.srv import SetBool, Trigger
 
-from valve_friction_ros.health import Level
-from valve_friction_ros.identification import RefusalError
+from valve_friction_ros.health.levels import Level
+from valve_friction_ros.identification.refusal import RefusalError
 
 _AGAIN = 0.5
 """Time without an answer, s, after which an idempotent request is repeated."""

@@ -18,15 +18,9 @@ from typing import Any
 import numpy as np
 from sensor_msgs.msg import FluidPressure, JointState
 
-from valve_friction_ros.model import (
-    KarnoppParameters,
-    StemState,
-    Valve,
-    advance,
-    balanced_state,
-    compile_kernels,
-)
 from valve_friction_ros.model.checks import require_non_negative
+from valve_friction_ros.model.simulation import StemState, advance, balanced_state, compile_kernels
+from valve_friction_ros.model.valve import KarnoppParameters, Valve
 from valve_friction_ros.nodes.plumbing.messages import stamp_of
 from valve_friction_ros.nodes.plumbing.parameters import (
     declare_parameters,

@@ -14,7 +14,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from valve_friction_ros.identification import SLIDING
+from valve_friction_ros.identification.settings import SLIDING
 from valve_friction_ros.model.checks import require_non_negative, require_positive
 from valve_friction_ros.model.drive import DEFAULT_LAG
 

@@ -16,7 +16,7 @@ import math
 from dataclasses import dataclass
 from enum import Enum, auto
 
-from valve_friction_ros.identification import RefusalError
+from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.model.excitations import SampledPressure
 from valve_friction_ros.wording import Code, Statement, said
 

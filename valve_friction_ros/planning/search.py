@@ -21,13 +21,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from valve_friction_ros.identification import (
-    IdentificationSettings,
-    RefusalError,
-    expected_half_widths,
-    percentage,
-)
-from valve_friction_ros.identification.settings import SLIDING
+from valve_friction_ros.identification.engine.method import expected_half_widths
+from valve_friction_ros.identification.refusal import RefusalError
+from valve_friction_ros.identification.settings import SLIDING, IdentificationSettings
 from valve_friction_ros.identification.trust.uncertainty import mean_sliding_friction
 from valve_friction_ros.identification.trust.verdict import FALL_SPEED
 from valve_friction_ros.model.excitations import Excitation
@@ -46,6 +42,7 @@ from valve_friction_ros.planning.stroke_test import (
     stroke_test,
     strokes,
 )
+from valve_friction_ros.wording import percentage
 
 _MOST_SAMPLES = 12_000
 """Most samples that a forecast simulates: fewer samples with less noise give the same intervals."""

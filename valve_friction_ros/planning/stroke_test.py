@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from valve_friction_ros.identification import RefusalError
+from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.model.checks import require_finite, require_positive
 from valve_friction_ros.model.excitations import SampledPressure
 from valve_friction_ros.model.valve import KarnoppParameters, Valve

@@ -18,9 +18,10 @@ from typing import Any
 
 import yaml
 
-from valve_friction_ros.identification import FIXABLE, STATED, require_valve_units
-from valve_friction_ros.model import KarnoppParameters, Valve
+from valve_friction_ros.identification.settings import FIXABLE, STATED
+from valve_friction_ros.identification.trust.plausible_units import require_valve_units
 from valve_friction_ros.model.checks import frozen
+from valve_friction_ros.model.valve import KarnoppParameters, Valve
 from valve_friction_ros.outside_text import nearest, resembling
 from valve_friction_ros.records.columns import Columns
 from valve_friction_ros.records.files import cause_of

@@ -26,9 +26,9 @@ from valve_friction_ros.figures.record_figures import (
     signature_loop_figure,
 )
 from valve_friction_ros.history import ValveHistory, drift_text
-from valve_friction_ros.identification import StemComparison
+from valve_friction_ros.identification.result import StemComparison
 from valve_friction_ros.identification.trust.verdict import Misfit
-from valve_friction_ros.model import Valve
+from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.reports.identification_tables import (
     budget_table,
     friction_table,

@@ -21,17 +21,18 @@ import numpy as np
 import scipy
 
 import valve_friction_ros
-from valve_friction_ros.health import Level, Measured, compared, dead_band, valve_changes
-from valve_friction_ros.health.measured import DIFFERENCES
+from valve_friction_ros.health.comparison import compared
+from valve_friction_ros.health.diagnosis import dead_band
+from valve_friction_ros.health.levels import Level
+from valve_friction_ros.health.measured import DIFFERENCES, Measured, valve_changes
 from valve_friction_ros.health.valve_numbers import comparable_numbers
-from valve_friction_ros.identification import (
+from valve_friction_ros.identification.result import Result
+from valve_friction_ros.identification.settings import (
     CALIBRATION,
     PARAMETER_UNITS,
     TIMING_UNCERTAINTY,
-    Result,
-    Verdict,
-    two_digits,
 )
+from valve_friction_ros.identification.trust.verdict import Verdict
 from valve_friction_ros.reports.identified_record import IdentifiedRecord, began
 from valve_friction_ros.reports.page import Column, PageTable, Verbatim
 from valve_friction_ros.wording import (
@@ -39,6 +40,7 @@ from valve_friction_ros.wording import (
     name_in_words,
     percentage,
     ratio_interval,
+    two_digits,
     with_width,
 )
 

@@ -15,29 +15,30 @@ from dataclasses import dataclass, field
 from datetime import datetime, timezone
 from functools import cached_property
 
-from valve_friction_ros.health import (
-    Baseline,
+from valve_friction_ros.health.baseline import Baseline
+from valve_friction_ros.health.diagnosis import (
     Diagnosis,
-    Finding,
     FrictionLimits,
     FrictionState,
-    KnownNumbers,
-    Level,
-    Measured,
-    StatusSignal,
-    Survey,
-    ValveLimits,
-    by_severity,
     dead_band,
     diagnose,
+)
+from valve_friction_ros.health.levels import Finding, Level, StatusSignal, Survey, by_severity
+from valve_friction_ros.health.measured import Measured
+from valve_friction_ros.health.valve_diagnosis import (
+    KnownNumbers,
+    ValveLimits,
     drive_scale,
     explains,
     qualified,
-    valve_numbers,
 )
+from valve_friction_ros.health.valve_numbers import valve_numbers
 from valve_friction_ros.history import ValveHistory
-from valve_friction_ros.identification import SLIDING, Parameter, Result, Verdict
-from valve_friction_ros.model import Recording, Valve
+from valve_friction_ros.identification.result import Result
+from valve_friction_ros.identification.settings import SLIDING
+from valve_friction_ros.identification.trust.verdict import Parameter, Verdict
+from valve_friction_ros.model.recording import Recording
+from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.reports.page import Colour, Conclusion
 from valve_friction_ros.response import ResponseSummary
 from valve_friction_ros.usage import LimitState, ValveUsage

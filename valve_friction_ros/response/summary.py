@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from valve_friction_ros.health import Finding, Level, StatusSignal
+from valve_friction_ros.health.levels import Finding, Level, StatusSignal
 from valve_friction_ros.response.moves import Hunting, StepAnswer
 from valve_friction_ros.wording import Code, said
 

@@ -35,7 +35,7 @@ from valve_friction_ros.commands.arguments.recording import (
 )
 from valve_friction_ros.dashboard.accounts import Role
 from valve_friction_ros.history import URL_VARIABLE
-from valve_friction_ros.identification import LEAST_FIT
+from valve_friction_ros.identification.trust.verdict import LEAST_FIT
 from valve_friction_ros.outside_text import nearest
 from valve_friction_ros.records.files import history_file
 from valve_friction_ros.records.units import POSITION_UNITS, PRESSURE_UNITS, unit_named

@@ -17,10 +17,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from valve_friction_ros.history import HistoryServer, is_url
-from valve_friction_ros.identification import PARAMETER_UNITS
 from valve_friction_ros.identification.settings import (
     DEFAULT_METHOD,
     FIXABLE,
+    PARAMETER_UNITS,
     IdentificationSettings,
 )
 from valve_friction_ros.outside_text import nearest, resembling
@@ -28,7 +28,8 @@ from valve_friction_ros.records.files import cause_of
 from valve_friction_ros.settings import IDENTIFICATION, SURVEY, identification_from, survey_from
 
 if TYPE_CHECKING:
-    from valve_friction_ros.health import FrictionLimits, Level
+    from valve_friction_ros.health.diagnosis import FrictionLimits
+    from valve_friction_ros.health.levels import Level
     from valve_friction_ros.history import KeptValve
     from valve_friction_ros.records.valve_file import ValveFile
 
@@ -115,7 +116,8 @@ def survey_limits(options: argparse.Namespace, described: "ValveFile") -> "Frict
 
     An option overrides the valve file. Raises ValueError if the limits are out of order.
     """
-    from valve_friction_ros.health import FrictionLimits, SurveyLimits  # noqa: PLC0415 - slow
+    from valve_friction_ros.health.diagnosis import FrictionLimits  # noqa: PLC0415 - slow
+    from valve_friction_ros.health.levels import SurveyLimits  # noqa: PLC0415 - slow
 
     given = {one.name: getattr(options, one.field) for one in SURVEY}
     stated = {name: value for name, value in given.items() if value is not None}
@@ -138,7 +140,7 @@ def has_failed(options: argparse.Namespace, found: "Iterable[Level]") -> bool:
     """Return whether ``--fail-on`` is given and one of the levels reaches it."""
     if options.fail_on is None:
         return False
-    from valve_friction_ros.health import Level  # noqa: PLC0415 - slow to import
+    from valve_friction_ros.health.levels import Level  # noqa: PLC0415 - slow to import
 
     return any(one >= Level[options.fail_on.upper()] for one in found)
 

@@ -22,7 +22,7 @@ from valve_friction_ros.commands.arguments.identification import (
     history_place,
     read_estimate,
 )
-from valve_friction_ros.identification import (
+from valve_friction_ros.identification.settings import (
     CALIBRATION,
     TIMING_UNCERTAINTY,
     UNITS,
@@ -32,7 +32,7 @@ from valve_friction_ros.planning.conditions import AIMS, STOP_MARGIN, Conditions
 from valve_friction_ros.settings import identification_from
 
 if TYPE_CHECKING:
-    from valve_friction_ros.planning import FrictionRange
+    from valve_friction_ros.planning.stroke_test import FrictionRange
     from valve_friction_ros.records.valve_file import ValveFile
 
 
@@ -159,7 +159,7 @@ def frictions_from(options: argparse.Namespace, described: "ValveFile") -> "Fric
 
     Raises ValueError if the spring is unknown or a number is impossible.
     """
-    from valve_friction_ros.planning import (  # noqa: PLC0415 - slow to import
+    from valve_friction_ros.planning.stroke_test import (  # noqa: PLC0415 - slow to import
         known_friction,
         unknown_friction,
     )

@@ -24,7 +24,7 @@ from valve_friction_ros.records.bags.topics import VALVE_FILE, TopicChoice
 from valve_friction_ros.records.columns import Columns
 
 if TYPE_CHECKING:
-    from valve_friction_ros.model import Valve
+    from valve_friction_ros.model.valve import Valve
     from valve_friction_ros.records.recorded_valve import RecordedValve
     from valve_friction_ros.records.recordings import ReadingOptions
     from valve_friction_ros.records.valve_file import ValveFile
@@ -214,7 +214,7 @@ def described(
     A recorded force needs no valve file. Raises ValueError if the valve file cannot be read, or is
     required but not given.
     """
-    from valve_friction_ros.model import Valve  # noqa: PLC0415 - slow to import
+    from valve_friction_ros.model.valve import Valve  # noqa: PLC0415 - slow to import
     from valve_friction_ros.records.files import on_disk  # noqa: PLC0415
     from valve_friction_ros.records.recordings import holds_force  # noqa: PLC0415
     from valve_friction_ros.records.valve_file import ValveFile, read_valve_file  # noqa: PLC0415

@@ -23,8 +23,8 @@ from rclpy.executors import Executor
 from rclpy.node import Node
 from sensor_msgs.msg import FluidPressure, JointState
 
-from valve_friction_ros.identification import RefusalError
-from valve_friction_ros.model import Recording
+from valve_friction_ros.identification.refusal import RefusalError
+from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.nodes.plumbing.messages import position_of, stamp_of
 from valve_friction_ros.nodes.plumbing.polled_subscription import PolledSubscription
 from valve_friction_ros.nodes.plumbing.qos import stream

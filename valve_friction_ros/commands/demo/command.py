@@ -36,25 +36,19 @@ from valve_friction_ros.commands.demo.bench import (
 from valve_friction_ros.commands.demo.plant import require_dashboard, show_plant
 from valve_friction_ros.commands.process import ExitCode, requests_raise
 from valve_friction_ros.figures import Case, friction_figure, require_picture_file, save_picture
-from valve_friction_ros.health import Level
-from valve_friction_ros.identification import (
-    UNITS,
-    IdentificationSettings,
-    Parameter,
-    RefusalError,
-    Verdict,
-    identify,
-    parameter_cells,
-    parameter_mapping,
-)
-from valve_friction_ros.identification.methods import compile_methods
-from valve_friction_ros.model import (
+from valve_friction_ros.health.levels import Level
+from valve_friction_ros.identification.methods import compile_methods, identify
+from valve_friction_ros.identification.refusal import RefusalError
+from valve_friction_ros.identification.rendering import parameter_cells, parameter_mapping
+from valve_friction_ros.identification.settings import UNITS, IdentificationSettings
+from valve_friction_ros.identification.trust.verdict import Parameter, Verdict
+from valve_friction_ros.model.excitations import (
     BENCH_VALVE,
     HIGH_FRICTION,
     LOW_FRICTION,
-    KarnoppParameters,
     SquareWave,
 )
+from valve_friction_ros.model.valve import KarnoppParameters
 from valve_friction_ros.streams import RecordBuffer
 
 WEIGHED_MASS = 1.6

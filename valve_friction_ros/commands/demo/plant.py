@@ -22,8 +22,8 @@ from rich.console import Console
 
 from valve_friction_ros.commands.demo.bench import ANSWER_TIMEOUT, NodeProcess, running_nodes
 from valve_friction_ros.commands.process import ExitCode
-from valve_friction_ros.identification import RefusalError
-from valve_friction_ros.model import BENCH_VALVE, SquareWave
+from valve_friction_ros.identification.refusal import RefusalError
+from valve_friction_ros.model.excitations import BENCH_VALVE, SquareWave
 from valve_friction_ros.nodes.service_call import Caller, caller
 
 _PORT = 8080

@@ -20,7 +20,6 @@ from zoneinfo import ZoneInfo
 from nicegui import run, ui
 
 from valve_friction_ros.dashboard.context import Answer, DashboardContext
-from valve_friction_ros.dashboard.live_state import ValveAlarm
 from valve_friction_ros.dashboard.pages.theme import (
     AnswerLine,
     Frame,
@@ -35,12 +34,19 @@ from valve_friction_ros.dashboard.pages.theme import (
     text,
 )
 from valve_friction_ros.dashboard.plant_rows import address_of, moment
-from valve_friction_ros.health import AlarmAction, AlarmError, AlarmKind, AlarmRequest, AlarmState
-from valve_friction_ros.health.alarms import TRANSITIONS
+from valve_friction_ros.health.alarms import (
+    TRANSITIONS,
+    Alarm,
+    AlarmAction,
+    AlarmError,
+    AlarmKind,
+    AlarmRequest,
+    AlarmState,
+)
 from valve_friction_ros.history import AlarmFilter, HistoryError, KeptAlarmEvent
 from valve_friction_ros.outside_text import printable
 from valve_friction_ros.streams import DAY
-from valve_friction_ros.wording import alarm_advice, numbered
+from valve_friction_ros.wording import numbered
 
 _PERIOD = 1.0
 
@@ -71,11 +77,9 @@ _LASTING = frozenset({AlarmAction.SHELVE, AlarmAction.TAKE_OUT})
 """Actions that last for a set time."""
 
 
-def _possible(state: str) -> tuple[AlarmAction, ...]:
-    """Return the actions that an alarm allows in a state, given in words."""
-    return tuple(
-        one for one in _ACTIONS if any(s.value == state and a is one for s, a in TRANSITIONS)
-    )
+def _possible(alarm: Alarm) -> tuple[AlarmAction, ...]:
+    """Return the actions that an alarm allows now."""
+    return tuple(one for one in _ACTIONS if (alarm.state, one) in TRANSITIONS)
 
 
 @dataclass(frozen=True)
@@ -163,13 +167,13 @@ def _row(number: int, one: KeptAlarmEvent, zone: ZoneInfo, href: str, is_journal
         "until": "" if alarm.until is None else moment(alarm.until, zone)[:16],
         "css": level.name.lower() if alarm.is_told else "unknown",
         "level": level.name if alarm.is_active else "",
-        "advice": alarm_advice(alarm.kind.value, level.name) if alarm.is_told else "",
+        "advice": alarm.advice if alarm.is_told else "",
         "say": printable(alarm.message, 300),
         "when": moment(event.time, zone),
         "raised": moment(alarm.raised, zone)[:16],
         "by": printable(by, 120),
         "text": printable(event.text, 500),
-        "can": [] if is_journal else [a.name for a in _possible(alarm.state.value)],
+        "can": [] if is_journal else [a.name for a in _possible(alarm)],
     }
 
 
@@ -348,7 +352,7 @@ class _AlarmPage:
             return
         alarm = one.event.alarm
         title = f"{printable(one.valve.tag, 80)}, {alarm}"
-        may, who = _possible(alarm.state.value), self._context.visitors.name()
+        may, who = _possible(alarm), self._context.visitors.name()
         chosen = next((action for action in may if action.name == name), None)
         if name and chosen is None:
             self._answer.tell(False, f"{title} already")
@@ -372,7 +376,7 @@ class AlarmStates:
 
     def __init__(self, context: DashboardContext, node: str, zone: ZoneInfo) -> None:
         self._context, self._node, self._zone = context, node, zone
-        self._alarms: tuple[ValveAlarm, ...] | None = None
+        self._alarms: tuple[Alarm, ...] | None = None
 
     def draw(self) -> None:
         """Draw the panel, still without alarms."""
@@ -387,33 +391,33 @@ class AlarmStates:
                         color=None,
                     ).props("no-caps unelevated dense").classes("vf-act")
 
-    def show(self, alarms: tuple[ValveAlarm, ...]) -> None:
+    def show(self, alarms: tuple[Alarm, ...]) -> None:
         """Show the present alarms."""
         if alarms == self._alarms:
             return
         self._alarms = alarms
         redraw(self._body, lambda: self._draw_alarms(alarms))
 
-    def _draw_alarms(self, alarms: Sequence[ValveAlarm]) -> None:
+    def _draw_alarms(self, alarms: Sequence[Alarm]) -> None:
         if not alarms:
             text("p", "No current alarms.", "vf-none")
         for one in alarms:
             self._draw_alarm(one)
 
-    def _draw_alarm(self, one: ValveAlarm) -> None:
-        css = one.level.lower() if one.is_told else "unknown"
-        kind = AlarmKind(one.kind)
+    def _draw_alarm(self, one: Alarm) -> None:
+        css = one.condition.level.name.lower() if one.is_told else "unknown"
+        kind = one.kind
         with element("div", "vf-alarm"):
             chip(css, kind.words)
             end = "" if one.until is None else f" until {moment(one.until, self._zone)[:16]}"
-            ui.label(one.state + end)
+            ui.label(one.state.value + end)
             if self._context.visitors.may_operate():
-                may, acknowledge = _possible(one.state), AlarmAction.ACKNOWLEDGE
+                may, acknowledge = _possible(one), AlarmAction.ACKNOWLEDGE
                 ask = partial(self._ask, kind.words, kind, may)
                 if acknowledge in may:
                     self._button("Acknowledge", kind.words, partial(ask, acknowledge))
                 self._button("More …", kind.words, ask)
-            text("p", one.message, "vf-none")
+            text("p", printable(one.message, 2000), "vf-none")
 
     @staticmethod
     def _button(words: str, name: str, click: Callable[[], Awaitable[None]]) -> None:

@@ -44,7 +44,7 @@ from valve_friction_ros.dashboard.pages.theme import (
     text,
 )
 from valve_friction_ros.dashboard.plant_rows import FRICTIONS, moment, quantity_texts
-from valve_friction_ros.health import AlarmEvent
+from valve_friction_ros.health.alarms import AlarmEvent
 from valve_friction_ros.history import HistoryEntry, ValveHistory, drift_text
 from valve_friction_ros.outside_text import printable
 from valve_friction_ros.streams import utc_day

@@ -22,7 +22,7 @@ from valve_friction_ros.dashboard.context import (
     OfferedFile,
     ValveFiles,
 )
-from valve_friction_ros.dashboard.live_state import Heard, Quantity, ValveAlarm, ValveView
+from valve_friction_ros.dashboard.live_state import Heard, Quantity, ValveView
 from valve_friction_ros.dashboard.live_strip import LiveStrip
 from valve_friction_ros.dashboard.pages.alarm_page import AlarmStates
 from valve_friction_ros.dashboard.pages.theme import (
@@ -60,7 +60,7 @@ from valve_friction_ros.dashboard.plant_rows import (
     state_of,
     state_words,
 )
-from valve_friction_ros.health import AlarmEvent
+from valve_friction_ros.health.alarms import Alarm, AlarmEvent
 from valve_friction_ros.history import AlarmFilter, HistoryError, ValveHistory
 from valve_friction_ros.outside_text import printable
 from valve_friction_ros.wording import lack_remedies, name_in_words
@@ -345,7 +345,7 @@ class _ValvePage:
         self._revision = -1
         self._beat = 0
         self._history: ValveHistory | None = None
-        self._kept_alarms: tuple[ValveAlarm, ...] | None = None
+        self._kept_alarms: tuple[Alarm, ...] | None = None
         self._head = _ValveHead(page, context.is_live)
         signals = context.signals
         self._signals = ValveSignals(LiveStrip(60.0) if signals is None else signals.watch(node))

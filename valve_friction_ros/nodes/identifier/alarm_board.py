@@ -17,7 +17,9 @@ from rclpy.parameter import Parameter
 from std_srvs.srv import SetBool
 
 from valve_friction_ros import history as database
-from valve_friction_ros.health import (
+from valve_friction_ros.health.alarm_conditions import ALARM_OF_SIDE, Delay, FrictionHold, shown_by
+from valve_friction_ros.health.alarms import (
+    NO_CONDITION,
     Alarm,
     AlarmAction,
     AlarmError,
@@ -25,17 +27,13 @@ from valve_friction_ros.health import (
     AlarmKind,
     AlarmRequest,
     Condition,
-    Delay,
-    Finding,
-    FrictionHold,
-    FrictionMonitor,
-    Level,
-    StatusSignal,
+    all_followed,
+    all_requested,
 )
-from valve_friction_ros.health.alarm_conditions import ALARM_OF_SIDE, shown_by
-from valve_friction_ros.health.alarms import NO_CONDITION, all_followed, all_requested
+from valve_friction_ros.health.friction_monitor import FrictionMonitor
+from valve_friction_ros.health.levels import Finding, Level, StatusSignal
 from valve_friction_ros.history.status_values import alarm_values
-from valve_friction_ros.identification import RefusalError
+from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.nodes.identifier.evidence_watch import EvidenceWatch
 from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
 from valve_friction_ros.nodes.plumbing.polled_node import PolledNode, create_service

@@ -18,16 +18,9 @@ from rclpy.node import Node
 
 from valve_friction_ros import history as database
 from valve_friction_ros.alerts import URL_VARIABLE, Alert, Outbox, Secrets, Webhook
-from valve_friction_ros.health import (
-    Alarm,
-    AlarmKind,
-    AlarmState,
-    Diagnosis,
-    Finding,
-    Level,
-    StatusSignal,
-    leading_ratio,
-)
+from valve_friction_ros.health.alarms import Alarm, AlarmKind, AlarmState
+from valve_friction_ros.health.diagnosis import Diagnosis, leading_ratio
+from valve_friction_ros.health.levels import Finding, Level, StatusSignal
 from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
 from valve_friction_ros.nodes.identifier.workers import Workers
 from valve_friction_ros.wording import Statement, sentence

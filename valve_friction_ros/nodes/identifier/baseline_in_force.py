@@ -16,20 +16,14 @@ from collections.abc import Callable, Iterable
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from valve_friction_ros.health import (
-    Baseline,
-    BaselineLack,
-    BaselineRefusalError,
-    Diagnosis,
-    Finding,
-    FrictionMonitor,
-    Lack,
-    Level,
-    lack_of_moves,
-)
+from valve_friction_ros.health.baseline import Baseline, BaselineLack, BaselineRefusalError, Lack
+from valve_friction_ros.health.by_evidence import lack_of_moves
+from valve_friction_ros.health.diagnosis import Diagnosis
+from valve_friction_ros.health.friction_monitor import FrictionMonitor
+from valve_friction_ros.health.levels import Finding, Level
 from valve_friction_ros.history import KeptBaseline
 from valve_friction_ros.history.status_values import number_text
-from valve_friction_ros.identification import RefusalError
+from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.nodes.identifier.evidence_watch import EvidenceWatch
 from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
 from valve_friction_ros.streams import utc_minute

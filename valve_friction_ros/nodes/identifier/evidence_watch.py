@@ -20,33 +20,23 @@ from typing import TYPE_CHECKING
 from rclpy.node import Node
 
 from valve_friction_ros import history as database
-from valve_friction_ros.evidence import (
-    MOST_MOVES,
-    Evidence,
-    FrictionChange,
-    Move,
-    MoveStream,
-    evidence_of,
-    is_clock_reset,
-    stamp_problem,
-)
-from valve_friction_ros.health import (
-    OF_ONE_RESULT,
-    Baseline,
-    Diagnosis,
-    Finding,
-    FrictionMonitor,
-    Level,
-    MonitorSettings,
+from valve_friction_ros.evidence.estimate import MOST_MOVES, Evidence, FrictionChange, evidence_of
+from valve_friction_ros.evidence.moves import Move, MoveStream, is_clock_reset, stamp_problem
+from valve_friction_ros.health.baseline import Baseline
+from valve_friction_ros.health.by_evidence import (
     baseline_by_evidence,
     diagnosis_by_evidence,
-    qualified,
     reference_by_evidence,
     why_not_compared,
 )
+from valve_friction_ros.health.diagnosis import Diagnosis
+from valve_friction_ros.health.friction_monitor import FrictionMonitor, MonitorSettings
+from valve_friction_ros.health.levels import Finding, Level
+from valve_friction_ros.health.valve_diagnosis import qualified
+from valve_friction_ros.health.valve_numbers import OF_ONE_RESULT
 from valve_friction_ros.history import KeptValve
 from valve_friction_ros.history.status_values import number_text, ratio_values
-from valve_friction_ros.identification import IdentificationSettings
+from valve_friction_ros.identification.settings import IdentificationSettings
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
 from valve_friction_ros.nodes.plumbing.worker import InternalError, Worker, bugs_reported, done_in
@@ -352,7 +342,7 @@ class EvidenceWatch:
         """Return a finding if friction has grown or collapsed."""
         self._settle()
         diagnosis = self.diagnosis
-        if diagnosis is None or diagnosis.level < Level.WARN or diagnosis.state.is_uncertain:
+        if diagnosis is None or diagnosis.level < Level.WARN:
             return ()
         statement, leads = diagnosis.statement, self._leads(diagnosis)
         if not leads:

@@ -22,15 +22,11 @@ from typing import TYPE_CHECKING, TypeVar
 from rclpy.node import Node
 
 from valve_friction_ros import history as database
-from valve_friction_ros.health import (
-    Alarm,
-    AlarmKind,
-    Baseline,
-    FrictionMonitor,
-    IdentificationInput,
-    KnownNumbers,
-    Level,
-)
+from valve_friction_ros.health.alarms import Alarm, AlarmKind
+from valve_friction_ros.health.baseline import Baseline
+from valve_friction_ros.health.friction_monitor import FrictionMonitor, IdentificationInput
+from valve_friction_ros.health.levels import Level
+from valve_friction_ros.health.valve_diagnosis import KnownNumbers
 from valve_friction_ros.history import (
     AlarmRecording,
     HistoryEntry,
@@ -43,7 +39,7 @@ from valve_friction_ros.history import (
     server_from,
 )
 from valve_friction_ros.history.place import Claim
-from valve_friction_ros.identification import RefusalError
+from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.nodes.identifier.workers import HistoryThread
 from valve_friction_ros.nodes.plumbing.worker import InternalError, bugs_reported, done_in
 from valve_friction_ros.streams import END_OF_TIME, utc_second

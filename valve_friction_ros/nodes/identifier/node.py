@@ -24,21 +24,17 @@ from rclpy.clock import Clock, ClockType, JumpThreshold, TimeJump
 from rclpy.duration import Duration
 from rclpy.parameter import Parameter
 
-from valve_friction_ros.health import (
-    AlarmKind,
-    Finding,
-    FrictionLimits,
-    FrictionMonitor,
-    Level,
-    MonitorSettings,
-    RefusedRecordError,
-    SurveyLimits,
-    ValveLimits,
-    by_severity,
-)
+from valve_friction_ros.health.alarms import AlarmKind
+from valve_friction_ros.health.diagnosis import FrictionLimits
+from valve_friction_ros.health.friction_monitor import FrictionMonitor, MonitorSettings
+from valve_friction_ros.health.levels import Finding, Level, SurveyLimits, by_severity
 from valve_friction_ros.health.measured import DIFFERENCES
+from valve_friction_ros.health.valve_diagnosis import ValveLimits
+from valve_friction_ros.health.valve_numbers import RefusedRecordError
 from valve_friction_ros.history import HistoryError
-from valve_friction_ros.identification import STATED, RefusalError, require_valve_units
+from valve_friction_ros.identification.refusal import RefusalError
+from valve_friction_ros.identification.settings import STATED
+from valve_friction_ros.identification.trust.plausible_units import require_valve_units
 from valve_friction_ros.nodes.identifier.alarm_board import AlarmBoard
 from valve_friction_ros.nodes.identifier.alerts import Alerts, FaultLog, log_level, webhook_from
 from valve_friction_ros.nodes.identifier.baseline_in_force import BaselineInForce, baseline_from

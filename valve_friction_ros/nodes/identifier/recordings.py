@@ -22,10 +22,12 @@ import numpy as np
 from rclpy.node import Node
 
 from valve_friction_ros import history as database
-from valve_friction_ros.health import FrictionMonitor, Level
+from valve_friction_ros.health.friction_monitor import FrictionMonitor
+from valve_friction_ros.health.levels import Level
 from valve_friction_ros.history import AlarmRecording, HistoryError
-from valve_friction_ros.identification import STATED, RefusalError
-from valve_friction_ros.model import Valve
+from valve_friction_ros.identification.refusal import RefusalError
+from valve_friction_ros.identification.settings import STATED
+from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
 from valve_friction_ros.nodes.identifier.response_watch import ResponseWatch
 from valve_friction_ros.nodes.identifier.usage_watch import UsageWatch

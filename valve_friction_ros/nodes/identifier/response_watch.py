@@ -21,16 +21,10 @@ from rclpy.node import Node
 from sensor_msgs.msg import JointState
 
 from valve_friction_ros import history as database
-from valve_friction_ros.health import (
-    Finding,
-    FrictionMonitor,
-    Level,
-    Standstill,
-    StandstillCounter,
-    StatusSignal,
-    dead_band,
-    standstill_finding,
-)
+from valve_friction_ros.health.diagnosis import dead_band
+from valve_friction_ros.health.friction_monitor import FrictionMonitor
+from valve_friction_ros.health.levels import Finding, Level, StatusSignal
+from valve_friction_ros.health.standstill import Standstill, StandstillCounter, standstill_finding
 from valve_friction_ros.history.status_values import number_text
 from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
 from valve_friction_ros.nodes.plumbing.messages import positions_in, readable

@@ -21,17 +21,9 @@ from rclpy.publisher import Publisher
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, Float64MultiArray, MultiArrayDimension, MultiArrayLayout
 
-from valve_friction_ros.health import (
-    Diagnosis,
-    Finding,
-    FrictionMonitor,
-    Level,
-    StatusSignal,
-    Survey,
-    by_severity,
-    dead_band,
-    dead_band_half_width,
-)
+from valve_friction_ros.health.diagnosis import Diagnosis, dead_band
+from valve_friction_ros.health.friction_monitor import FrictionMonitor
+from valve_friction_ros.health.levels import Finding, Level, StatusSignal, Survey, by_severity
 from valve_friction_ros.history import HistoryEntry, Trend
 from valve_friction_ros.history.status_values import (
     baseline_values,
@@ -40,7 +32,9 @@ from valve_friction_ros.history.status_values import (
     result_values,
     trend_values,
 )
-from valve_friction_ros.identification import SLIDING, UNITS, Result, Sweep
+from valve_friction_ros.identification.published.sweep import Sweep
+from valve_friction_ros.identification.result import Result
+from valve_friction_ros.identification.settings import SLIDING, UNITS
 from valve_friction_ros.nodes.plumbing.messages import time_message
 from valve_friction_ros.nodes.plumbing.polled_node import PolledNode
 from valve_friction_ros.nodes.plumbing.qos import LATCHED
@@ -79,10 +73,7 @@ def estimate_status(
     if estimate is not None and monitor.stamp is not None:
         values["estimate_time"] = exact_time(monitor.stamp)
         values["estimate_from"] = "this run" if monitor.earlier is None else "before the restart"
-        valve = monitor.settings.valve
-        values |= result_values(
-            estimate.to_dict(), dead_band(estimate, valve), dead_band_half_width(estimate, valve)
-        )
+        values |= result_values(estimate, monitor.settings.valve)
     values |= baseline_values(monitor.baseline)
     values |= ratio_values(diagnosis.ratio)
     if diagnosis.survey is not Survey.UNKNOWN:

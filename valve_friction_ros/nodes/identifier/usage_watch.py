@@ -19,7 +19,8 @@ from typing import TYPE_CHECKING
 from rclpy.node import Node
 
 from valve_friction_ros import history as database
-from valve_friction_ros.health import Finding, FrictionMonitor, Level, StatusSignal
+from valve_friction_ros.health.friction_monitor import FrictionMonitor
+from valve_friction_ros.health.levels import Finding, Level, StatusSignal
 from valve_friction_ros.history import HistoryError
 from valve_friction_ros.history.status_values import number_text
 from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter

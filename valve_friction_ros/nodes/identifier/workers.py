@@ -20,16 +20,16 @@ from rclpy.node import Node
 from rclpy.timer import Timer
 
 from valve_friction_ros.alerts import AlertSender
-from valve_friction_ros.health import (
-    DigestDesk,
+from valve_friction_ros.health.alarms import DigestDesk
+from valve_friction_ros.health.friction_monitor import (
     FrictionMonitor,
     IdentificationInput,
-    RefusedRecordError,
     identify_with_numbers,
 )
+from valve_friction_ros.health.valve_numbers import RefusedRecordError
 from valve_friction_ros.history import HistoryError
-from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.identification.methods import compile_methods
+from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.model.compiled import find_cache, note_cache
 from valve_friction_ros.nodes.identifier.status import NumberTopics
 from valve_friction_ros.nodes.plumbing.processes import Processes

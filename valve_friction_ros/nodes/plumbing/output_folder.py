@@ -20,7 +20,7 @@ from pathlib import Path
 
 from rclpy.node import Node
 
-from valve_friction_ros.identification import RefusalError
+from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.nodes.plumbing.worker import done_in
 from valve_friction_ros.records.files import data_folder
 from valve_friction_ros.streams import utc

@@ -26,7 +26,7 @@ from rcl_interfaces.msg import (
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from valve_friction_ros.model import KarnoppParameters, Valve
+from valve_friction_ros.model.valve import KarnoppParameters, Valve
 from valve_friction_ros.nodes.plumbing.rclpy_private import parameter_overrides
 from valve_friction_ros.outside_text import nearest, resembling
 from valve_friction_ros.settings import KARNOPP, NODE_NAMES, VALVE, Setting, is_known

@@ -45,7 +45,7 @@ from rclpy.task import Task
 from rclpy.timer import Timer
 from std_srvs.srv import Trigger
 
-from valve_friction_ros.identification import RefusalError
+from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.nodes.plumbing.qos import REQUESTS
 from valve_friction_ros.nodes.plumbing.rclpy_private import (
     awaits_coroutines,

@@ -26,7 +26,7 @@ from collections.abc import Callable
 from importlib import import_module
 from typing import Any, TypeVar
 
-from valve_friction_ros.identification import RefusalError
+from valve_friction_ros.identification.refusal import RefusalError
 
 _Result = TypeVar("_Result")
 

@@ -22,7 +22,7 @@ from weakref import WeakSet
 from rclpy.node import Node
 from rclpy.task import Future as Awaited
 
-from valve_friction_ros.identification import RefusalError
+from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.model.compiled import kernels_are_cached
 from valve_friction_ros.nodes.plumbing.processes import ElsewhereError
 

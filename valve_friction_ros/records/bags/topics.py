@@ -58,11 +58,11 @@ class TopicChoice:
 
 
 class StreamNames(NamedTuple):
-    """Topics of a bag to write, and the name of the joint of the stem."""
+    """Topics of the samples of a valve, and the joint that is the stem; empty if unknown."""
 
-    pressure: str
-    stem: str
-    joint: str
+    pressure: str = ""
+    stem: str = ""
+    joint: str = ""
 
 
 class ValveTopics(NamedTuple):
