@@ -123,6 +123,13 @@ def test_the_page_of_the_default_method(reported, write_csv, columns_of, quick_r
     assert "0 samples" not in words.replace("1000 samples", "")
 
 
+def test_the_page_is_titled_by_the_tag(reported, quick_csv, bench_yaml, tmp_path):
+    tagged = tmp_path / "fv.yaml"
+    tagged.write_text(f"valve_tag: FV-101\n{bench_yaml.read_text()}")
+    page, _ = reported(quick_csv, "--method", "bench", valve=("--valve", tagged))
+    assert page.said("h1") == ["Friction of FV-101"]
+
+
 def test_a_test_that_did_not_move_the_stem_shows_what_held_it(
     call, write_csv, columns_of, quick_record, bench_yaml
 ):

@@ -132,6 +132,7 @@ def _of_healthy(
 
 def _write_files(
     options: argparse.Namespace,
+    tag: str,
     recorded: RecordedValve,
     result: Result,
     baseline: Baseline | None,
@@ -148,7 +149,7 @@ def _write_files(
         from valve_friction_ros import reports  # noqa: PLC0415 - slow to import
 
         record = reports.IdentifiedRecord(
-            name=recorded.name.strip("/") or recorded.path.name,
+            name=tag or recorded.name.strip("/") or recorded.path.name,
             source=recorded.label,
             result=result,
             baseline=baseline,
@@ -242,7 +243,9 @@ def run(options: argparse.Namespace) -> int:
         for each, outcome, _, _ in answers:
             if isinstance(outcome, Result):
                 zone = reading.columns.time_zone
-                _write_files(options, each, outcome, baseline, healthy, settings.limits, zone)
+                limits = settings.limits
+                tag = description.tag
+                _write_files(options, tag, each, outcome, baseline, healthy, limits, zone)
     if options.fail_on is not None and baseline is None:
         complain(
             options.command,
