@@ -195,6 +195,14 @@ class TestWithoutRos:
         assert "of the travel, measured from the end without air," in text
         assert f"{float(rows[0]['abort_above_mm']):.1f} mm" in text
 
+    def test_a_signal_that_does_not_hold_the_test_is_refused_before_the_search(
+        self, refusal, tmp_path, monkeypatch
+    ):
+        monkeypatch.setattr("valve_friction_ros.commands.plan_test.plan_test", pytest.fail)
+        for signal in ("0.9..1.0 bar", "0.9..x"):
+            wanted = ("--table", tmp_path / "steps.csv", "--signal-range", signal)
+            assert signal[:3] in refusal(*KNOWN, *QUICK, *wanted)
+
     def test_table_and_form_in_psi_and_inch(self, plan, tmp_path, capsys):
         """1 psi is 6894.757 Pa, and 1 in 25.4 mm: the same steps, to 1 Pa and to 0.01 mm."""
         written = {}

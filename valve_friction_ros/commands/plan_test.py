@@ -34,9 +34,11 @@ from valve_friction_ros.planning.steps import (
     ShownUnit,
     form_of,
     set_points,
+    signal_range,
     stem_limits,
     table_of,
 )
+from valve_friction_ros.planning.stroke_test import pressure_band
 from valve_friction_ros.records.files import write_whole
 from valve_friction_ros.records.units import POSITION_UNITS, PRESSURE_UNITS, span
 from valve_friction_ros.records.valve_file import ValveFile, read_valve_file
@@ -226,10 +228,15 @@ def _units(options: argparse.Namespace) -> tuple[ShownUnit, ShownUnit]:
     )
 
 
-def _planned(options: argparse.Namespace, described: ValveFile) -> StrokePlan:
+def _planned(
+    options: argparse.Namespace, described: ValveFile, signal: tuple[float, float] | None
+) -> StrokePlan:
     """Search for the test, with a progress bar on a terminal."""
     frictions = frictions_from(options, described)
     given = {one.name: vars(options).get(one.name, one.default) for one in fields(Limits)}
+    if options.table is not None or options.form is not None:
+        band = pressure_band(described.valve, frictions, Limits(**given))
+        signal_range(described.valve, frictions, band, signal)  # before the search, which is long
     conditions = Conditions(
         options.sample_rate,
         1e-6 * options.position_noise_um,
@@ -258,8 +265,8 @@ def run(options: argparse.Namespace) -> int:
             raise ValueError(f"{path}: it already exists: give another name, or --replace")
     require_outputs(*files, picture=options.figure)
     described = read_valve_file(options.valve, options.valve_name)
-    plan = _planned(options, described)
     signal = span(options.signal_range, PRESSURE_UNITS) if options.signal_range else None
+    plan = _planned(options, described, signal)
     texts = {}
     if options.table is not None or options.form is not None:
         steps = set_points(plan, signal)

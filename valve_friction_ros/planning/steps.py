@@ -16,8 +16,10 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.planning.played_test import PRESSURE_MARGIN
 from valve_friction_ros.planning.search import StrokePlan
+from valve_friction_ros.planning.stroke_test import FrictionRange, PressureBand
 from valve_friction_ros.wording import two_digits
 
 _LOW_CURRENT, _CURRENT_SPAN = 4.0, 16.0
@@ -103,25 +105,34 @@ def stem_limits(plan: StrokePlan) -> tuple[float, float]:
     return max(lowest, 0.0), min(highest, 1.0)
 
 
-def set_points(plan: StrokePlan, signal: tuple[float, float] | None) -> tuple[SetPoint, ...]:
-    """Return the steps of a planned test.
+def signal_range(
+    valve: Valve,
+    frictions: FrictionRange,
+    band: PressureBand,
+    signal: tuple[float, float] | None = None,
+) -> tuple[float, float]:
+    """Return the pressures of a signal of 0 and 100 %, Pa, for a test that spans the band.
 
-    Parameters
-    ----------
-    plan : StrokePlan
-        The test.
-    signal : tuple of float or None
-        Pressures of a signal of 0 and 100 %, Pa. None: those between which the spring alone moves
-        the stem; a positioner's set point is then the position of a stem without friction.
+    By default they are those between which the spring alone moves the stem; a positioner's set
+    point is then the position of a stem without friction.
 
-    Raises
-    ------
-    ValueError
-        If the signal's range does not hold the pressures of the test.
+    Raises ValueError if the range of the signal does not hold the band.
     """
-    constant, preload = plan.frictions.spring
-    by_spring = (preload, preload + constant * plan.valve.travel)
-    low, high = signal or map(plan.valve.actuator_drive, by_spring)
+    constant, preload = frictions.spring
+    by_spring = (preload, preload + constant * valve.travel)
+    low, high = signal or map(valve.actuator_drive, by_spring)
+    if any(not 0 <= round((one - low) / (high - low), 6) <= 1 for one in (band.low, band.high)):
+        raise ValueError(
+            f"the test needs {band.low / 1e5:.4g} to {band.high / 1e5:.4g} bar, but the "
+            f"signal covers {low / 1e5:.4g} to {high / 1e5:.4g}: give the converter's range "
+            "(--signal-range '0.2..1.0 bar')"
+        )
+    return low, high
+
+
+def set_points(plan: StrokePlan, signal: tuple[float, float] | None) -> tuple[SetPoint, ...]:
+    """Return the steps of a planned test; `signal` and errors are those of `signal_range`."""
+    low, high = signal_range(plan.valve, plan.frictions, plan.band, signal)
     test, stem = plan.test, stem_limits(plan)
     times, pressures = test.times.tolist(), test.pressures.tolist()
     span = plan.band.high - plan.band.low
@@ -145,12 +156,6 @@ def set_points(plan: StrokePlan, signal: tuple[float, float] | None) -> tuple[Se
             )
         )
         moving = rate or moving
-    if any(not 0 <= round(one.share, 6) <= 1 for one in steps):
-        raise ValueError(
-            f"the test needs {plan.band.low / 1e5:.4g} to {plan.band.high / 1e5:.4g} bar, but the "
-            f"signal covers {low / 1e5:.4g} to {high / 1e5:.4g}: give the converter's range "
-            "(--signal-range '0.2..1.0 bar')"
-        )
     return tuple(steps)
 
 
