@@ -427,6 +427,14 @@ class TestTable:
         valve = read_plant(path)["FV-1"].valve
         assert (valve.diaphragm_area, valve.travel) == pytest.approx((0.0445, 0.0286))
 
+    @pytest.mark.parametrize("nothing", ["", "none", "None", "-", "n/a"])
+    def test_a_valve_without_a_spring_range(self, tmp_path, nothing):
+        path = tmp_path / "valves.csv"
+        path.write_text(f"tag;area [cm2];travel [mm];spring;range\nFV-1;445;28.6;{nothing};-\n")
+        found = read_plant(path)["FV-1"]
+        assert "spring_constant" not in found.known
+        assert found.valve.pressure_maximum == math.inf
+
     def test_what_it_says(self, tmp_path):
         path = tmp_path / "valves.csv"
         path.write_text(TABLE)

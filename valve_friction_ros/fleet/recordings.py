@@ -185,6 +185,8 @@ def _findings(folder: Path, own: set[Path]) -> Findings:
 _NUMBERS = {name: name for name in ("area", "travel", "opposing_area", "mass")}
 _NUMBERS |= {"spring": "spring_range", "range": "sensor_range"}
 """Columns of numbers with units, and their names in `QUESTIONS`."""
+_NO_VALUE = ("none", "-", "–", "n/a")
+"""Cells of such a column that are as good as empty, such as the spring of a piston."""
 _WORDS = ("tag", "air_to", "sensor")
 _READ = {question.name: question.read for question in QUESTIONS}
 _HEADER = re.compile(r"\s*([\w ]+?)\s*(?:[\[(](.+)[\])])?\s*")
@@ -213,9 +215,9 @@ def _row(cells: Mapping[str, tuple[str, str]]) -> str:
     for name, (cell, unit) in cells.items():
         number = _NUMBERS.get(name)
         try:
-            if number is not None:
+            if number is not None and cell.casefold() not in _NO_VALUE:
                 values[number] = _value(_READ[number], cell, unit)
-            elif name not in _WORDS:
+            elif number is None and name not in _WORDS:
                 columns[name] = yaml.safe_load(cell) if cell.lower() in ("true", "false") else cell
         except ValueError as error:
             raise ValueError(f"{name}: {error}") from None
