@@ -411,6 +411,19 @@ class TestEntries:
             "3",
         ]
 
+    def test_zeros_in_a_row_are_told(self, write):
+        """They are kept: a valve that is shut and opened again from sample to sample reads so."""
+        time = np.arange(400) / 10
+        position, pressure = 20 + 10 * np.sin(time / 4), 1 + 0.5 * np.sin(time / 4)
+        pressure[100:111] = pressure[300:302] = 0.0
+        heads = "Time [s],Stem position [mm],Actuator pressure [bar]"
+        found = recorded(write([heads, *rows(time, position, pressure)]), Valve(0.05, travel=0.04))
+        assert found.notes[1:] == (
+            "'Actuator pressure [bar]' jumps to 0 for 11 samples from row 102 on (one of 2 such "
+            "runs): if its transmitter failed then, empty these cells",
+        )
+        assert np.count_nonzero(found.recording().drive) == 387
+
     def test_beyond_the_share(self, write):
         lines = with_row(12, "0.01,closed,1e5")
         lines[20:23] = ["0.019,open,1e5", "0.02,open,1e5", "0.021,open,1e5"]

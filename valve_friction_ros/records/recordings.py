@@ -26,7 +26,13 @@ from valve_friction_ros.records.columns import Columns
 from valve_friction_ros.records.header_words import plain_name
 from valve_friction_ros.records.layout import TableSignal
 from valve_friction_ros.records.recorded_valve import RecordedValve, Stretch
-from valve_friction_ros.records.table import OpenTables, ReadSignal, left_out, require_good
+from valve_friction_ros.records.table import (
+    OpenTables,
+    ReadSignal,
+    jumps_to_zero,
+    left_out,
+    require_good,
+)
 from valve_friction_ros.records.table_rows import readable
 from valve_friction_ros.records.units import (
     FORCE_UNITS,
@@ -159,7 +165,7 @@ def _recorded(
     except RefusalError as refusal:
         raise RefusalError(f"{table.name}: {refusal}") from None
     notes = [] if table.layout.is_own else [table.layout.words]
-    notes += [told for each in reads if (told := left_out(each))]
+    notes += [told for each in reads for told in (left_out(each), jumps_to_zero(each)) if told]
     return recording, tuple(notes)
 
 

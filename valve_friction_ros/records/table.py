@@ -31,6 +31,7 @@ from valve_friction_ros.records.recorded_valve import Stretch
 from valve_friction_ros.records.table_rows import open_raw
 from valve_friction_ros.records.units import PERCENT, PRESSURE_UNITS, SHARES
 from valve_friction_ros.records.written_times import NO_TIME, TimeForm, WrittenTimes, in_one
+from valve_friction_ros.signals import runs_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -310,21 +311,31 @@ class _Reader:
         return f"{self.path}: {place} {what} ({now} after {before}): {remedy}"
 
 
+def _dropouts(values: NDArray[np.float64]) -> NDArray[np.intp]:
+    """Return first and one-past-last sample of each run of zeros that a signal jumps to and from.
+
+    It jumps further than anywhere else, and back to where it was, shape (n, 2).
+    """
+    is_zero = values == 0
+    inner = [run for run in runs_of(is_zero) if run[0] > 0 and run[1] < values.size]
+    runs: NDArray[np.intp] = np.array(inner, np.intp).reshape(-1, 2)
+    if not inner:
+        return runs
+    before, after = values[runs[:, 0] - 1], values[runs[:, 1]]
+    fall = np.minimum(np.abs(before), np.abs(after))
+    steps = np.abs(np.diff(values))[~(is_zero[1:] | is_zero[:-1])]
+    usual = np.maximum(np.abs(after - before), np.quantile(steps, 0.99) if steps.size else 0.0)
+    return np.asarray(runs[(before * after > 0) & (fall > _LEAST_FALL * usual)])
+
+
 def _without_dropouts(read: ReadSignal) -> ReadSignal:
     """Leave out single zeros that a signal falls to for one sample, as without connection."""
-    values = read.values
-    is_zero = values == 0
-    if values.size < 3 or not is_zero.any():
+    lone = [first for first, end in _dropouts(read.values).tolist() if end - first == 1]
+    if not lone:
         return read
-    before, after = values[:-2], values[2:]
-    fall = np.minimum(np.abs(before), np.abs(after))
-    lone = is_zero[1:-1] & (before * after > 0) & (fall > _LEAST_FALL * np.abs(after - before))
-    steps = np.abs(np.diff(values))[~(is_zero[1:] | is_zero[:-1])]
-    lone &= fall > _LEAST_FALL * (np.quantile(steps, 0.99) if steps.size else 0.0)
-    if not lone.any():
-        return read
-    kept = np.pad(~lone, 1, constant_values=True)
-    read.bad[_DROPOUT] += int(np.sum(lone))
+    kept = np.ones(read.values.size, dtype=np.bool_)
+    kept[lone] = False
+    read.bad[_DROPOUT] += len(lone)
     if not read.example[0]:
         read.example = (int(read.rows[~kept][0]), read.signal.name, _DROPOUT)
     return read.where(kept)
@@ -495,6 +506,22 @@ def left_out(read: ReadSignal) -> str:
     return (
         f"{read.bad.total()} of {whole} values of {quoted(read.signal.name)} are bad and were "
         f"left out ({', '.join(named)}{more})"
+    )
+
+
+def jumps_to_zero(read: ReadSignal) -> str:
+    """Say where a signal is 0 for several samples, as a failed transmitter is; '' if nowhere.
+
+    They are kept: a valve may have been shut, and slowly sampled signals jump, too.
+    """
+    runs = _dropouts(read.values)
+    if not runs.size:
+        return ""
+    first, end = runs[0]
+    more = f" (one of {len(runs)} such runs)" if len(runs) > 1 else ""
+    return (
+        f"{quoted(read.signal.name)} jumps to 0 for {end - first} samples from row "
+        f"{read.rows[first]} on{more}: if its transmitter failed then, empty these cells"
     )
 
 
