@@ -83,6 +83,10 @@ class TestReadRecording:
         frame.index = index.tz_localize(None) if zone is None else index.tz_convert(zone)
         dated = [frame, {"time_s": frame.index, **{name: frame[name] for name in frame}}]
         dated.append(frame.reset_index(names="time_s"))
+        if zone is not None:
+            pytest.importorskip("pyarrow")
+            arrow = frame.index.to_series().astype(f"timestamp[us, tz={zone}][pyarrow]")
+            dated += [frame.set_index(arrow), frame.assign(time_s=arrow)]
         for found in map(vf.read_recording, dated):
             assert found.start_time == 100.0
             np.testing.assert_array_equal(found.position, loose_record.position)

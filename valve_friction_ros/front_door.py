@@ -108,9 +108,11 @@ _LATEST = 2**63 / 1e9
 def _stamps(columns: Mapping[str, Any]) -> NDArray[np.int64]:
     """Return ``time_s``, or the dates in a frame's index, as ns; dates count from 1970."""
     given: Any = columns["time_s"] if "time_s" in columns else getattr(columns, "index", None)
-    if getattr(getattr(given, "dtype", None), "tz", None) is not None:  # pandas
-        dates = given.dt if hasattr(given, "dt") else given
-        given = dates.tz_convert("UTC").to_numpy("datetime64[ns]")
+    dtype = getattr(given, "dtype", None)
+    if getattr(dtype, "kind", "") == "M" and hasattr(given, "to_numpy"):  # pandas, or its Arrow
+        dates = getattr(given, "to_series", lambda: given)().dt
+        if dates.tz is not None:
+            given = dates.tz_convert("UTC").to_numpy("datetime64[ns]")
     kind = np.asarray(given).dtype.kind
     if kind in "Mm" and not isinstance(given, np.ma.MaskedArray):
         dated = np.asarray(given, f"{kind}8[ns]")
