@@ -213,6 +213,16 @@ def test_arguments_of_other_types_are_named(columns, loose_record, benches):
         vf.compare(result, 150.0)
     with pytest.raises(TypeError, match=r"^parameters must be of type KarnoppParameters or Result"):
         vf.simulate(valve, valve, loose_record.pressure, 0.01)
+    with pytest.raises(TypeError, match=r"^parameters must be of type KarnoppParameters or Result"):
+        vf.validate(loose_record, valve, columns)
+    with pytest.raises(
+        TypeError, match=r"^recording must be of type Recording, got dict: give wha"
+    ):
+        vf.validate(columns, valve, result)
+    with pytest.raises(
+        TypeError, match=r"^fixed must be of type Mapping, got list: give names and"
+    ):
+        vf.IdentificationSettings(fixed=["mass"])
 
 
 def test_a_ratio_without_an_interval_says_so(loose_record, benches):

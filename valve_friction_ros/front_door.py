@@ -21,7 +21,7 @@ from valve_friction_ros.health.baseline import Baseline
 from valve_friction_ros.health.diagnosis import Diagnosis, FrictionLimits
 from valve_friction_ros.health.valve_diagnosis import diagnose_valve
 from valve_friction_ros.identification.result import Result
-from valve_friction_ros.model.checks import A_VALVE, require_type
+from valve_friction_ros.model.checks import A_MODEL, A_VALVE, require_type
 from valve_friction_ros.model.drive import Drive
 from valve_friction_ros.model.recording import Recording, require_row
 from valve_friction_ros.model.simulation import StemState, Trajectory
@@ -197,13 +197,7 @@ def simulate(
     20.9
     """
     require_type("valve", valve, A_VALVE, Valve)
-    require_type(
-        "parameters",
-        parameters,
-        "a result, or vf.KarnoppParameters(...)",
-        KarnoppParameters,
-        Result,
-    )
+    require_type("parameters", parameters, A_MODEL, KarnoppParameters, Result)
     if isinstance(parameters, Result):
         parameters = parameters.simulated_model()
     return simulated(valve, parameters, drive, sample_period, start)

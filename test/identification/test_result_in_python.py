@@ -104,6 +104,9 @@ def test_the_band_holds_the_true_stem_and_is_narrow(result):
     inside = (low - 1e-6 <= truth) & (truth <= high + 1e-6)
     assert np.mean(inside) > 0.9
     assert 0 < np.max(high - low) < 1e-4
+    for draws in (0, 1, 2.5):
+        with pytest.raises(ValueError, match=r"^draws must be a whole number of at least 2"):
+            result.stem_band(PRESSURE, 0.01, draws)
 
 
 class TestModels:

@@ -32,7 +32,7 @@ from valve_friction_ros.identification.signature.valve_signature import ValveSig
 from valve_friction_ros.identification.trust.stated import CONTRADICTED, with_stated
 from valve_friction_ros.identification.trust.uncertainty import CORRELATION
 from valve_friction_ros.identification.trust.verdict import Misfit, Parameter, with_calibration
-from valve_friction_ros.model.checks import frozen
+from valve_friction_ros.model.checks import frozen, require_type, require_whole
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.simulation import simulate
 from valve_friction_ros.model.valve import KarnoppParameters, Valve
@@ -362,6 +362,7 @@ class Result:
         ValueError
             If they are of different records.
         """
+        require_type("other", other, "what vf.identify returns", Result)
         mine, others = self.stem, other.stem
         if mine is None or others is None:
             raise RefusalError(
@@ -396,7 +397,7 @@ class Result:
         sample_period : float
             Time between two samples, s.
         draws : int
-            Number of models drawn from the covariance of the parameters.
+            Number of models drawn from the covariance of the parameters, at least two.
 
         Returns
         -------
@@ -408,7 +409,10 @@ class Result:
         ------
         RefusalError
             If there is no model, or the method gives no correlation.
+        ValueError
+            If fewer than two models are to be drawn.
         """
+        require_whole("draws", draws, 2)
         model, spread = self.simulated_model(), self.covariance()
         names = [one.name for one in fields(model) if one.name in spread.index]
         errors = spread.loc[names, names].to_numpy()

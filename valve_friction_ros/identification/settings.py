@@ -18,6 +18,8 @@ from valve_friction_ros.model.checks import (
     require_finite,
     require_non_negative,
     require_positive,
+    require_type,
+    require_whole,
 )
 
 SLIDING = "sliding_friction"
@@ -195,9 +197,11 @@ class IdentificationSettings:
 
     def __post_init__(self) -> None:
         """Refuse settings that contradict each other."""
+        for name in ("order", "steps", "resolution"):
+            require_whole(name, getattr(self, name))
         if self.order < 2:
             raise ValueError(f"order must be at least 2 for an acceleration, got {self.order}")
-        window = self.published_window
+        window = require_whole("derivative_window", self.published_window)
         if window % 2 == 0 or window < self.order + 2:
             raise ValueError(
                 f"derivative_window must be odd and at least order + 2 = {self.order + 2}, "
@@ -211,7 +215,7 @@ class IdentificationSettings:
         if self.timing_uncertainty is not None:
             require_non_negative("timing_uncertainty", self.timing_uncertainty)
         for name in CALIBRATION:
-            if not 0 <= getattr(self, name) < MOST_UNCERTAIN:
+            if not 0 <= require_finite(name, getattr(self, name)) < MOST_UNCERTAIN:
                 raise ValueError(
                     f"{name} must be at least 0 and below {MOST_UNCERTAIN:g}, got "
                     f"{getattr(self, name):g}: give a share, 0.02 for 2 %"
@@ -238,6 +242,7 @@ def current_name(method: str) -> str:
 
 def _checked(values: Mapping[str, float], names: tuple[str, ...], what: str) -> dict[str, float]:
     """Return the values of parameters, checked to be finite and of the right sign."""
+    require_type(what, values, "names and values, such as {'mass': 1.6}", Mapping)
     checked = {}
     for name, value in values.items():
         if name not in names:

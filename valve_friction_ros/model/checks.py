@@ -30,7 +30,8 @@ copyreg.pickle(MappingProxyType, lambda one: (frozen, (dict(one),)))
 
 
 A_VALVE = "vf.Valve(...), or the valve of vf.read_valve_file(...)"
-"""What to give for a valve."""
+A_MODEL = "a result, or vf.KarnoppParameters(...)"
+"""What to give for a valve, and for a model."""
 
 
 def require_type(name: str, given: object, remedy: str, *kinds: type) -> None:
@@ -40,6 +41,13 @@ def require_type(name: str, given: object, remedy: str, *kinds: type) -> None:
         raise TypeError(
             f"{name} must be of type {known}, got {type(given).__name__}: give {remedy}"
         )
+
+
+def require_whole(name: str, value: int, least: int = 0) -> int:
+    """Return `value` as an int, or raise ValueError if it is no whole number or below the least."""
+    if isinstance(value, bool) or not hasattr(value, "__index__") or value < least:
+        raise ValueError(f"{name} must be a whole number of at least {least}, got {value!r}")
+    return int(value)
 
 
 def require_finite(name: str, value: float) -> float:

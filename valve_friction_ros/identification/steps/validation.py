@@ -21,6 +21,7 @@ from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.identification.result import Result
 from valve_friction_ros.identification.settings import UNITS, IdentificationSettings
 from valve_friction_ros.identification.trust import excitation
+from valve_friction_ros.model.checks import A_MODEL, A_VALVE, require_type
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.simulation import StemState, simulate
 from valve_friction_ros.model.valve import KarnoppParameters, Valve
@@ -230,6 +231,9 @@ def validate(
     >>> print(str(validation).split(",")[0])
     fit 100.00 %
     """
+    require_type("recording", recording, "what vf.read_recording returns", Recording)
+    require_type("valve", valve, A_VALVE, Valve)
+    require_type("parameters", parameters, A_MODEL, KarnoppParameters, Result)
     notes: tuple[str, ...] = ()
     if isinstance(parameters, Result):
         parameters, notes = identified_model(parameters.values)
