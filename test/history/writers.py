@@ -36,6 +36,8 @@ def say(*words):
 
 def history(path, number, rows=""):
     """Add identifications and baselines of a valve."""
+    # Ten that write without a pause leave one of them waiting for long on a busy machine.
+    database._PATIENCE = 60.0
     file = HistoryFile(Path(path))
     valve = VALVE._replace(name=f"/fv_{number}/identifier")
     for k in range(int(rows)) if rows else count():
@@ -138,6 +140,7 @@ if __name__ == "__main__":
         HistoryServer,
         KeptBaseline,
         alarm_rows,
+        database,
         follow_alarms,
         keep_told_level,
         outbox,
