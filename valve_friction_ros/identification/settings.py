@@ -215,10 +215,11 @@ class IdentificationSettings:
         if self.timing_uncertainty is not None:
             require_non_negative("timing_uncertainty", self.timing_uncertainty)
         for name in CALIBRATION:
-            if not 0 <= require_finite(name, getattr(self, name)) < MOST_UNCERTAIN:
+            given = getattr(self, name)
+            if isinstance(given, str) or not 0 <= given < MOST_UNCERTAIN:
                 raise ValueError(
-                    f"{name} must be at least 0 and below {MOST_UNCERTAIN:g}, got "
-                    f"{getattr(self, name):g}: give a share, 0.02 for 2 %"
+                    f"{name} must be at least 0 and below {MOST_UNCERTAIN:g}, got {given}: "
+                    "give a share, 0.02 for 2 %"
                 )
         object.__setattr__(self, "fixed", frozen(_checked(self.fixed, FIXABLE, "fixed")))
         stated = _checked(self.stated, STATED, "stated")

@@ -478,7 +478,7 @@ class TestSettings:
             ({"order": 2.5}, r"^order must be a whole number of at least 0, got 2.5"),
             ({"steps": None}, r"^steps must be a whole number of at least 0, got None"),
             ({"derivative_window": "31"}, r"^derivative_window must be a whole number of .* '31'"),
-            ({"area_uncertainty": "2 %"}, r"^area_uncertainty must be a number, got '2 %'"),
+            ({"area_uncertainty": "2 %"}, r"^area_uncertainty must be .* got 2 %: give a share"),
             (
                 {"derivative_window": 30},
                 r"^derivative_window must be odd and at least order \+ 2 = 5, got 30",
