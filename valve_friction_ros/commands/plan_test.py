@@ -234,9 +234,11 @@ def _planned(
     """Search for the test, with a progress bar on a terminal."""
     frictions = frictions_from(options, described)
     given = {one.name: vars(options).get(one.name, one.default) for one in fields(Limits)}
+    limits = Limits(**given)
     if options.table is not None or options.form is not None:
-        band = pressure_band(described.valve, frictions, Limits(**given))
-        signal_range(described.valve, frictions, band, signal)  # before the search, which is long
+        # Refuses a narrow signal before the search, which is long.
+        band = pressure_band(described.valve, frictions, limits)
+        signal_range(described.valve, frictions, band, signal)
     conditions = Conditions(
         options.sample_rate,
         1e-6 * options.position_noise_um,
@@ -249,7 +251,7 @@ def _planned(
         return plan_test(
             described.valve,
             frictions,
-            Limits(**given),
+            limits,
             conditions,
             planned_settings(options, described),
             options.aim,

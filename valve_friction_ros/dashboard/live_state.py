@@ -369,8 +369,7 @@ def view_of(node: str, status: Status) -> ValveView:
 def alarms_in(values: Mapping[str, str]) -> tuple[Alarm, ...]:
     """Return the alarms that are not normal, from the values of a status, ignoring invalid ones."""
     found = []
-    for kind in AlarmKind:
-        name = f"alarm {kind.value}"
+    for kind, name in zip(AlarmKind, _ALARMS, strict=True):
         if values.get(name, _NORMAL) == _NORMAL:
             continue
         with contextlib.suppress(KeyError, ValueError):

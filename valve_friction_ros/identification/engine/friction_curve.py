@@ -350,8 +350,8 @@ def _unseen_between(force: _Array, position: _Array, way: _Array) -> float:
     jumps = np.flatnonzero(moves > _JUMP * np.mean(np.abs(way)))
     before, begin, end, after = force[np.clip(jumps + _NEAR, 0, force.size - 1)]
     rise, fall = begin - before, after - end
-    open_ = np.hypot(end - begin - 0.5 * (rise + fall), 0.5 * (rise - fall))
-    return RECTANGLE * 0.5 * float(moves[jumps] @ open_) / float(np.sum(np.abs(way)))
+    unseen = np.hypot(end - begin - 0.5 * (rise + fall), 0.5 * (rise - fall))
+    return RECTANGLE * 0.5 * float(moves[jumps] @ unseen) / float(np.sum(np.abs(way)))
 
 
 def _cut(position: _Array, turns: NDArray[np.intp], pieces: int) -> NDArray[np.intp]:

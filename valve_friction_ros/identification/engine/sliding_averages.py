@@ -445,13 +445,13 @@ class Work(NamedTuple):
         whole = [np.interp(time, one.time, one.value) for one in (force, stem)]
         sampled = np.minimum(np.searchsorted(averages.time, stem.time), averages.time.size - 1)
         speed = stem.mean_speed(averages.is_free[sampled], path.distance)
+        of_force = np.searchsorted(force.time, time)
 
         def by(length: int) -> "Work":
             pressed, position = (averaged_twice(one, length) for one in whole)
             along = np.gradient(position) * is_free / path.distance
             # The force between two of its samples has the noise of both.
-            of_samples = np.bincount(np.searchsorted(force.time, time), along)
-            noise = force.noise * float(np.linalg.norm(of_samples))
+            noise = force.noise * float(np.linalg.norm(np.bincount(of_force, along)))
             return cls(time, pressed, position, along, path.strokes, noise, speed)
 
         work = by(length)
