@@ -33,7 +33,6 @@ from valve_friction_ros.identification.engine.friction_curve import (
 from valve_friction_ros.identification.engine.intervals import Estimated
 from valve_friction_ros.identification.engine.lags import LagPrior
 from valve_friction_ros.identification.engine.sliding_averages import (
-    WORK_LAGS,
     MeasuredSignal,
     Work,
     _lengths,
@@ -540,10 +539,10 @@ def test_noise_of_the_force_in_its_work(slower):
         white = noise * np.random.default_rng(seed).standard_normal(force.size)
         drive = StampedSignal(time[::slower], force + white)
         signals = force_and_stem(StampedRecord(drive, stem, Drive.FORCE), Valve())
-        return Work.of(*signals, averages_of(*signals, Valve(), 0.12))
+        return Work.of(*signals, averages_of(*signals, Valve(), 0.12, LagPrior()), LagPrior())
 
     found = [work(deviation, seed) for seed in range(30)]
-    scatter = np.std([np.interp(0.0, WORK_LAGS, one.by_lag) for one in found])
+    scatter = np.std([np.interp(0.0, one.lags, one.by_lag) for one in found])
     foreseen = np.median([one.noise for one in found]) ** 2 - work(0.0, 0).noise ** 2
     assert math.sqrt(foreseen) == pytest.approx(scatter, rel=0.3)
 

@@ -22,7 +22,6 @@ from valve_friction_ros.identification.engine.coordinates import TIMING, Profile
 from valve_friction_ros.identification.engine.fitted_record import fitted_record, inflation
 from valve_friction_ros.identification.engine.intervals import Estimated
 from valve_friction_ros.identification.engine.lags import (
-    LAGS,
     LagPrior,
     LagProfile,
     mixture_half_width,
@@ -53,6 +52,7 @@ from valve_friction_ros.model import BENCH_VALVE, LOW_FRICTION, Drive, Recording
 from valve_friction_ros.model.recording import StampedRecord, StampedSignal
 from valve_friction_ros.signals import stamped_noise
 
+LAGS = LagPrior().lags
 SIGMA = 0.01
 SHARPNESS = 1.5  # the logarithm of the likelihood is divided by it
 
@@ -68,6 +68,22 @@ class TestLagPrior:
         expected = np.array([0.5, 0.95]) / inside
         assert np.array(share) / np.sum(density) == pytest.approx(expected, abs=1e-3)
         assert not LagPrior().is_known
+
+    def test_reach(self):
+        """150 ms; three deviations of a larger stated timing, in a tenth of the record at most."""
+        usual = LagPrior()
+        np.testing.assert_array_equal(usual.lags, np.linspace(-0.15, 0.15, 301))
+        np.testing.assert_array_equal(usual.work_lags, usual.lags[::10])
+        time = np.arange(0.0, 101.0)
+        signal = StampedSignal(time, time)
+        record = StampedRecord(signal, signal, Drive.FORCE)
+        assert LagPrior.of(None, record) == usual
+        assert LagPrior.of(0.04, record).reach == 0.15
+        for stated, reach in ((0.5, 1.5), (2.0, 6.0), (20.0, 10.0)):
+            prior = LagPrior.of(stated, record)
+            assert prior.reach == prior.lags[-1] == -prior.lags[0] == reach
+            assert prior.lags[prior.lags.size // 2] == 0.0
+            assert np.isin(prior.work_lags, prior.lags).all()
 
     def test_stated(self):
         """A Gaussian."""
@@ -101,7 +117,7 @@ class TestMixture:
         assert share_of_timing(1.0, 3.0, 2.0) == 0.0
 
     def test_spread(self):
-        assert spread_of(np.exp(-0.5 * (LAGS / SIGMA) ** 2)) == pytest.approx(SIGMA, rel=1e-3)
+        assert spread_of(np.exp(-0.5 * (LAGS / SIGMA) ** 2), LAGS) == pytest.approx(SIGMA, rel=1e-3)
 
 
 def fit_at(lag, cost, is_apart=False, residual=0.0):
@@ -131,25 +147,27 @@ def parabola(lifted=0.0):
 class TestProfile:
     def test_of_a_parabola(self):
         expected = -0.5 * (LAGS / SIGMA) ** 2 / SHARPNESS
-        found = LagProfile.of(parabola()).by_fits
+        found = LagProfile.of(parabola(), LagPrior()).by_fits
         np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-12)
 
     @pytest.mark.parametrize("lifted", [0.5, 3.0, 10.0])
     def test_a_fit_that_ends_too_high_excludes_no_lag(self, lifted):
-        usual = LagProfile.of(parabola()).by_fits
-        assert np.all(LagProfile.of(parabola(lifted)).by_fits >= usual - 0.5)
-        assert LagProfile.of(parabola(lifted)).by_fits[150] == 0.0
+        usual = LagProfile.of(parabola(), LagPrior()).by_fits
+        assert np.all(LagProfile.of(parabola(lifted), LagPrior()).by_fits >= usual - 0.5)
+        assert LagProfile.of(parabola(lifted), LagPrior()).by_fits[150] == 0.0
 
     def test_one_far_apart_is_as_likely_as_it_fits_and_no_more_than_the_best(self):
         far = 0.1
         there = int(np.argmin(np.abs(LAGS - far)))
         for cost, expected in ((4.0, -2.0), (-9.0, 0.0)):
-            found = LagProfile.of([*parabola(), fit_at(far, cost, is_apart=True)]).by_fits
+            found = LagProfile.of(
+                [*parabola(), fit_at(far, cost, is_apart=True)], LagPrior()
+            ).by_fits
             assert found[there] == pytest.approx(expected, abs=1e-3)
 
     def test_a_thirtieth_of_the_simulations_are_misled(self):
         """Of the probability 3 % are √10 times as wide: its logarithm is a tenth there."""
-        profile = LagProfile.of(parabola())
+        profile = LagProfile.of(parabola(), LagPrior())
         told, sharp = np.exp(profile.log_likelihood), np.exp(profile.by_fits)
         blunt = np.exp(-0.5 * (LAGS / SIGMA) ** 2 / (10.0 * SHARPNESS))
         expected = 0.97 * sharp / np.sum(sharp) + 0.03 * blunt / np.sum(blunt)
@@ -157,16 +175,20 @@ class TestProfile:
         assert profile.spread == pytest.approx(SIGMA * math.sqrt(SHARPNESS), rel=1e-2)
 
     def test_one_near_is_of_the_same_valley(self):
-        assert not LagProfile.of([*parabola(), fit_at(5.9 * SIGMA, 0.0, is_apart=True)]).apart
+        assert not LagProfile.of(
+            [*parabola(), fit_at(5.9 * SIGMA, 0.0, is_apart=True)], LagPrior()
+        ).apart
 
     def test_none_without_a_lag_or_with_an_absurd_one(self):
-        assert LagProfile.of([fit_at(0.15, 0.0)]) is None
-        assert LagProfile.of([fit_at(0.0, 0.0, is_apart=True)]) is None
+        assert LagProfile.of([fit_at(0.15, 0.0)], LagPrior()) is None
+        assert LagProfile.of([fit_at(0.0, 0.0, is_apart=True)], LagPrior()) is None
 
     def test_numbers_along_it(self):
         """Linear between fits, the linear model's slope beyond, and of a fit apart its own."""
         fits = [*parabola(), fit_at(0.1, 0.0, is_apart=True)]
-        found = LagProfile.of(fits).along({one: 7.0 + 100.0 * one.lag for one in fits}, -3.0)
+        found = LagProfile.of(fits, LagPrior()).along(
+            {one: 7.0 + 100.0 * one.lag for one in fits}, -3.0
+        )
         at = dict(zip(np.round(LAGS, 6), found, strict=True))
         assert at[0.005] == pytest.approx(7.5)
         assert at[-0.03] == pytest.approx(5.0 + 0.03)

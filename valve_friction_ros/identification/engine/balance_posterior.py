@@ -26,8 +26,6 @@ from valve_friction_ros.identification.engine.balance_regression import (
 from valve_friction_ros.identification.engine.fitted_record import inflation
 from valve_friction_ros.identification.engine.intervals import ROUNDING, Estimated
 from valve_friction_ros.identification.engine.lags import (
-    LAGS,
-    LARGEST_LAG,
     USUAL_LAG,
     LagProfile,
     mixture_half_width,
@@ -220,7 +218,8 @@ class Posterior:
         self.exchanged, self.less_viscous = 0.0, 0.0
         self.log_likelihood = None if regression.lag.is_known else self._of_lags()
         if self.log_likelihood is not None:
-            self.lags, self.probability = LAGS, regression.lag.probability(self.log_likelihood)
+            self.lags = regression.lag.lags
+            self.probability = regression.lag.probability(self.log_likelihood)
             self._exchange()
         self.of_record = self.probability
 
@@ -234,7 +233,7 @@ class Posterior:
         if precision > 0.05 * prior:
             precision /= max(float(self.scatter[index, index]) / variance, 1.0)
         self.information = precision * float(solved.scale[index]) ** 2
-        self.changes = (LAGS - solved.lag) * solved.scale[index]
+        self.changes = (self.regression.lag.lags - solved.lag) * solved.scale[index]
         log = -0.5 * precision * (self.changes - mean) ** 2
         for name in ("coulomb_friction", "viscous_friction"):
             if name in self.regression.names:
@@ -323,7 +322,7 @@ class Posterior:
             less = gradient[viscous] * self.solved.scale[viscous] * self.less_viscous
             later = self.less_viscous / self.regression.values(self.solved)["spring_constant"]
             changed = np.interp(self.lags + later, self.lags, beside) - beside
-            if later < LARGEST_LAG:
+            if later < self.regression.lag.reach:
                 rival = float(np.sum(weights * (values - less + changed)))
             values = np.hstack([values, values - less + changed])
             weights = np.hstack([(1.0 - self.exchanged) * weights, self.exchanged * weights])

@@ -24,12 +24,8 @@ from valve_friction_ros.identification.engine.coordinates import (
     zero_drift,
 )
 from valve_friction_ros.identification.engine.intervals import RECTANGLE
-from valve_friction_ros.identification.engine.lags import (
-    LARGEST_LAG,
-    LagPrior,
-)
+from valve_friction_ros.identification.engine.lags import LagPrior
 from valve_friction_ros.identification.engine.sliding_averages import (
-    WORK_LAGS,
     Averages,
     Work,
     averaged_twice,
@@ -284,7 +280,7 @@ class Regression:
             return 0.0
         index = len(self.names)
         change = float(solved.estimate[index] / solved.scale[index])
-        return float(np.clip(solved.lag + change, -LARGEST_LAG, LARGEST_LAG))
+        return float(np.clip(solved.lag + change, -self.lag.reach, self.lag.reach))
 
     def descended(self, stribeck: float) -> tuple[Solved, float]:
         """Iterate until lag and variance agree, without outliers; return the variance too."""
@@ -323,7 +319,7 @@ class Regression:
         known = sum(
             value * self.kept[name] for name, value in self.fixed.items() if name in self.kept
         )
-        return np.asarray(np.interp(lags, WORK_LAGS, self.work.by_lag) - known)
+        return np.asarray(np.interp(lags, self.work.lags, self.work.by_lag) - known)
 
     def rounding(self, name: str) -> float:
         """Return the deviation of a number due to the converter of the force (`Work.rounding`).
@@ -348,7 +344,7 @@ class Regression:
         if self.lag.is_known:
             return 0.0
         lags = lag + SECOND_ORDER * np.array([-1.0, 0.0, 1.0])
-        before, here, after = np.interp(lags, WORK_LAGS, self.work.by_lag)
+        before, here, after = np.interp(lags, self.work.lags, self.work.by_lag)
         return 0.5 * abs(float(before - 2.0 * here + after))
 
     def gradients(self, stribeck: float, solved: Solved) -> dict[str, _Array]:

@@ -286,7 +286,7 @@ def _estimated(
     middle, half = float(np.mean(found.position)), max(0.5 * float(np.ptp(found.position)), 1e-9)
     place, age = (found.position - middle) / half, np.linspace(-1.0, 1.0, size)
     plain = np.column_stack([side, place, np.ones_like(place)])
-    start = _by_least_magnitudes(plain, found.force)
+    start = by_least_magnitudes(plain, found.force)
     raw = abs(float(start[0]))
     columns = np.column_stack(
         [
@@ -353,7 +353,7 @@ def _estimated(
     return Estimated(value, whole, record, timing, shared=timing), known
 
 
-def _by_least_magnitudes(columns: _Array, values: _Array) -> _Array:
+def by_least_magnitudes(columns: _Array, values: _Array) -> _Array:
     """Regress with the least sum of the residuals' magnitudes, which one outlier does not move."""
     weight: _Array = np.ones(values.size)
     estimate: _Array = np.zeros(columns.shape[1])

@@ -38,15 +38,15 @@ from valve_friction_ros.identification.engine.intervals import (
     ROUNDING,
     Estimated,
 )
-from valve_friction_ros.identification.engine.lags import LAGS, LARGEST_LAG, LagPrior, LagProfile
+from valve_friction_ros.identification.engine.lags import LagPrior, LagProfile
 from valve_friction_ros.identification.engine.sliding_averages import (
     FINEST_STEP,
-    WORK_LAGS,
     MeasuredSignal,
     Work,
     averages_of,
     away_from_stops,
     force_and_stem,
+    larger_change,
     least_stroke,
     quiet_grid,
     turns_of,
@@ -139,7 +139,8 @@ class FrictionCurve:
     `stribeck_velocity` is 0 where friction does not clearly fall with speed; `lag` is the most
     probable time by which the stem is seen late, s; `fit` is the share of the force that the
     balance reproduces, `misfit` the deviation of the residual, N, and `inflation` that over what
-    noise explains. Whole strokes have neither a correlation of the numbers nor a posterior.
+    noise explains; `by_sample` is the `larger_change` of the sliding friction by a sample, N. Whole
+    strokes have neither a correlation of the numbers nor a posterior.
     """
 
     averaging_time: float
@@ -153,6 +154,7 @@ class FrictionCurve:
     inflation: float
     fit: float
     misfit: float
+    by_sample: float = 0.0
     correlation: Correlation | None = field(default=None, repr=False)
     posterior: Posterior | None = field(default=None, repr=False)
 
@@ -195,14 +197,14 @@ def friction_curves(
     found: list[Posterior] = []
     for times, most in ((longer, _MOST_CURVES), (shorter, 1)):
         for time in times:
-            averages = averages_of(force, stem, valve, time) if len(found) < most else None
+            averages = averages_of(force, stem, valve, time, lag) if len(found) < most else None
             if averages is not None:
-                work = found[0].regression.work if found else Work.of(force, stem, averages)
+                work = found[0].regression.work if found else Work.of(force, stem, averages, lag)
                 found.append(posterior_of(Regression(averages, work, valve, lag, fixed)))
         if found:
             break
     # A lag at the limit of what is possible compensates for something else.
-    found = [one for one in found if abs(one.regression.later(one.solved)) < LARGEST_LAG]
+    found = [one for one in found if abs(one.regression.later(one.solved)) < lag.reach]
     likelihoods = [one.log_likelihood for one in found if one.log_likelihood is not None]
     likelihoods = _believed(likelihoods, [one.regression.later(one.solved) for one in found])
     for one in found:
@@ -243,6 +245,7 @@ def _curve_of(posterior: Posterior) -> FrictionCurve:
         posterior.inflation,
         1.0 - solved.misfit / max(float(np.std(averages.force[0][averages.taken])), _TINY),
         solved.misfit,
+        regression.work.by_sample,
         correlation_of(gradients, solved.covariance),
         posterior,
     )
@@ -304,8 +307,12 @@ def _by_strokes(
         left = forces - columns @ (covariance @ (rows.T @ (weight * forces)) / variance)
         scatter = math.sqrt(float(np.sum((weight * left) ** 2)) / freedom)
         variance = max(scatter, _LEAST_SCATTER * float(np.ptp(pressed))) ** 2
-    by_lag = np.array([weights @ mean(np.interp(grid - late, grid, pressed)) for late in WORK_LAGS])
-    value, of_lag = _over_lags(by_lag, lag)
+
+    def late_by(late: float) -> float:
+        """Friction if the stem is seen late, N."""
+        return float(weights @ mean(np.interp(grid - late, grid, pressed)))
+
+    value, of_lag = _over_lags(np.array([late_by(one) for one in lag.work_lags]), lag)
     distance = float(np.sum(np.abs(way)))
     along = moves / distance
     rounding = work_of_rounding(force, grid, along)
@@ -313,17 +320,11 @@ def _by_strokes(
         half_width(math.sqrt(float(covariance[0, 0])), freedom),
         NORMAL_QUANTILE * math.hypot(rounding, _unseen_between(pressed, position, way)),
     )
-    timing = of_lag / NORMAL_QUANTILE
+    record, timing = of_record / NORMAL_QUANTILE, of_lag / NORMAL_QUANTILE
     sources = {ROUNDING: rounding} if rounding > 0.0 else {}
     squares = np.add.reduceat(np.gradient(halves[0]) * np.gradient(halves[1]), turns[:-1])
-    sliding = Estimated(
-        value,
-        math.hypot(of_record, of_lag),
-        of_record / NORMAL_QUANTILE,
-        timing,
-        sources,
-        timing,
-    )
+    width = math.hypot(of_record, of_lag)
+    sliding = Estimated(value, width, record, timing, sources, timing)
     return FrictionCurve(
         step,
         (squares / step)[is_free] / way[is_free],
@@ -336,6 +337,7 @@ def _by_strokes(
         inflation=1.0,
         fit=1.0 - scatter / max(float(np.std(pressed)), _TINY),
         misfit=scatter,
+        by_sample=larger_change(late_by, max(force.period, stem.period)),
     )
 
 
@@ -366,10 +368,10 @@ def _cut(position: _Array, turns: NDArray[np.intp], pieces: int) -> NDArray[np.i
 
 def _over_lags(by_lag: _Array, lag: LagPrior) -> tuple[float, float]:
     """Return the mean of a friction over the probable lags, and the half width due to them, N."""
-    values = np.interp(LAGS, WORK_LAGS, by_lag)
+    values = np.interp(lag.lags, lag.work_lags, by_lag)
     if lag.is_known:
-        return float(np.interp(0.0, LAGS, values)), 0.0
-    probability = lag.probability(np.zeros_like(LAGS))
+        return float(np.interp(0.0, lag.lags, values)), 0.0
+    probability = lag.probability(np.zeros_like(lag.lags))
     mean = float(probability @ values)
     away = np.abs(values - mean)
     order = np.argsort(away)

@@ -325,7 +325,8 @@ def estimated(
     usual, the interval of the sliding friction also covers its value from the measured signals
     alone (`loop_friction`).
     """
-    fit, profile = fits[0], LagProfile.of(fits)
+    lag = lag or LagPrior()
+    fit, profile = fits[0], LagProfile.of(fits, lag)
     late = _least_viscous(fits, numbers_at)
     if profile is None:
         found = {}
@@ -334,7 +335,7 @@ def estimated(
             width, rival = NORMAL_QUANTILE * _deviation(fit, here), late.get(name, here).value
             found[name] = Estimated(here.value, width, record, timing, sources, timing, rival)
     else:
-        found = _over_lags(profile, numbers_at, lag or LagPrior(), late)
+        found = _over_lags(profile, numbers_at, lag, late)
     for name, one in found.items():
         width = one.half_width
         if name == SLIDING:
@@ -360,9 +361,9 @@ def _over_lags(
     """Integrate each number of the likeliest fit over the lag."""
     best = profile.best
     places = {fit: numbers_at(fit.model, fit.at) for fit in (*profile.fits, *profile.apart)}
-    prior = lag if lag.deviation is None else LagPrior(math.inf)
+    prior = lag if lag.deviation is None else replace(lag, deviation=math.inf)
     probability = prior.probability(profile.log_likelihood)
-    unsaid = 1.0 - spread_of(probability) ** 2 / profile.spread**2
+    unsaid = 1.0 - spread_of(probability, lag.lags) ** 2 / profile.spread**2
     found = {}
     for name, first in places[best].items():
         known = {fit: numbers.get(name, first) for fit, numbers in places.items()}

@@ -27,12 +27,19 @@ from valve_friction_ros.identification.engine.coordinates import TIMING
 from valve_friction_ros.identification.engine.posterior_fit import PosteriorFit
 from valve_friction_ros.identification.settings import TIMING_UNCERTAINTY
 from valve_friction_ros.identification.trust.uncertainty import CONFIDENCE, NORMAL_QUANTILE
+from valve_friction_ros.model.recording import StampedRecord
 
 _Array = NDArray[np.float64]
 
 LARGEST_LAG = 0.15
-LAGS: _Array = np.linspace(-LARGEST_LAG, LARGEST_LAG, 301, dtype=np.float64)
-"""Lags that are possible, s."""
+_STATED, _OF_RECORD = 3.0, 0.1
+"""Largest lag that is possible, s. Where a larger timing uncertainty is stated, the largest lag in
+deviations of it, and at most as a share of the record."""
+
+_STEP, _MOST_STEPS = 1e-3, 1500
+_WORKS, _EVERY = 150, 10
+"""Step between the lags, s, and the most steps in each direction; and the most lags at which the
+work of the force is computed, of which it takes every tenth at most."""
 
 USUAL_LAG = 4e-3
 """Scale, s, of the prior of the lag where no timing is stated, a Cauchy distribution.
@@ -71,10 +78,29 @@ class LagPrior:
     """Prior of the time by which the stem is seen late.
 
     A Gaussian of this deviation, s; with None the heavy-tailed prior of a plant without a stated
-    timing.
+    timing. No lag is larger than its `reach`, s.
     """
 
     deviation: float | None = None
+    reach: float = LARGEST_LAG
+
+    @classmethod
+    def of(cls, deviation: float | None, record: StampedRecord) -> "LagPrior":
+        """Return the prior for a record, with a stated deviation, s, if any."""
+        duration = float(record.position.time[-1] - record.position.time[0])
+        stated = min(_STATED * (deviation or 0.0), _OF_RECORD * duration)
+        return cls(deviation, max(LARGEST_LAG, stated))
+
+    @cached_property
+    def lags(self) -> _Array:
+        """Lags that are possible, s."""
+        count = min(round(self.reach / _STEP), _MOST_STEPS)
+        return np.linspace(-self.reach, self.reach, 2 * count + 1, dtype=np.float64)
+
+    @cached_property
+    def work_lags(self) -> _Array:
+        """Lags, s, at which the work of the force is computed."""
+        return self.lags[:: max(self.lags.size // _WORKS, _EVERY)]
 
     @property
     def is_known(self) -> bool:
@@ -107,8 +133,8 @@ class LagPrior:
         return np.asarray(-np.log1p((lags / USUAL_LAG) ** 2))
 
     def probability(self, log_likelihood: _Array) -> _Array:
-        """Return the probability of each of `LAGS`, by this prior and a likelihood."""
-        log = self.log_density(LAGS) + log_likelihood
+        """Return the probability of each of `lags`, by this prior and a likelihood."""
+        log = self.log_density(self.lags) + log_likelihood
         probability = np.exp(log - log.max())
         return np.asarray(probability / np.sum(probability))
 
@@ -153,11 +179,11 @@ def share_of_timing(half_width: float, record: float, timing: float) -> float:
     return min(timing, math.sqrt(max(whole**2 - record**2, 0.0)))
 
 
-def spread_of(density: _Array) -> float:
-    """Return the deviation of the lag by its density at `LAGS`, s, at least `_LEAST_DEVIATION`."""
-    probability = density / np.sum(density)
-    mean = float(probability @ LAGS)
-    return math.sqrt(max(float(probability @ (LAGS - mean) ** 2), _LEAST_DEVIATION**2))
+def spread_of(probability: _Array, lags: _Array) -> float:
+    """Return the deviation of some lags by their probability, s, at least `_LEAST_DEVIATION`."""
+    probability = probability / np.sum(probability)
+    mean = float(probability @ lags)
+    return math.sqrt(max(float(probability @ (lags - mean) ** 2), _LEAST_DEVIATION**2))
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,33 +191,34 @@ class LagProfile:
     """Likelihood of the lag, from fits that are held at several lags, in that order.
 
     No valley leads from these to the fits `apart`. All are compared by the `inflation` of the
-    residual of the best fit.
+    residual of the best fit. The lags are those of the `prior`.
     """
 
     fits: Sequence[PosteriorFit]
     apart: Sequence[PosteriorFit]
     inflation: float
+    prior: LagPrior
 
     @classmethod
-    def of(cls, fits: Sequence[PosteriorFit]) -> "LagProfile | None":
+    def of(cls, fits: Sequence[PosteriorFit], prior: LagPrior) -> "LagProfile | None":
         """Return the profile of some fits; None if no fit has a lag, or the best lag is absurd."""
         able = [one for one in fits if one.lags.any() and not one.is_apart]
         if not able:
             return None
         inflation = min(able, key=lambda one: one.objective).inflation
         best = min(able, key=lambda one: one.cost(inflation))
-        if abs(best.lag) >= LARGEST_LAG:
+        if abs(best.lag) >= prior.reach:
             return None
         found: list[PosteriorFit] = []
         for one in sorted(able, key=lambda one: one.cost(inflation)):
             if all(abs(one.lag - other.lag) > _LEAST_DEVIATION for other in found):
                 found.append(one)
-        profile = cls(sorted(found, key=lambda one: one.lag), (), inflation)
+        profile = cls(sorted(found, key=lambda one: one.lag), (), inflation, prior)
         reach = 2.0 * _NEAR * profile.deviation
         apart = [
             one
             for one in fits
-            if one.is_apart and reach < abs(one.lag - best.lag) and abs(one.lag) < LARGEST_LAG
+            if one.is_apart and reach < abs(one.lag - best.lag) and abs(one.lag) < prior.reach
         ]
         return replace(profile, apart=apart)
 
@@ -218,7 +245,7 @@ class LagProfile:
 
     @cached_property
     def log_likelihood(self) -> _Array:
-        """Logarithm of the likelihood of each of `LAGS`, by fits that are `_MISLED` at times."""
+        """Logarithm of the likelihood of each lag, by fits that are `_MISLED` at times."""
         blunt = self.by_fits / _TEMPERED
         misled = _MISLED / (1.0 - _MISLED) * np.sum(np.exp(self.by_fits)) / np.sum(np.exp(blunt))
         return np.asarray(np.logaddexp(self.by_fits, math.log(misled) + blunt))
@@ -226,17 +253,18 @@ class LagProfile:
     @property
     def spread(self) -> float:
         """Deviation of the lag by the fits alone, s."""
-        return spread_of(np.exp(self.by_fits))
+        return spread_of(np.exp(self.by_fits), self.prior.lags)
 
     @cached_property
     def by_fits(self) -> _Array:
-        """Logarithm of the likelihood of each of `LAGS` by the fits alone, the likeliest at 0.
+        """Logarithm of the likelihood of each lag by the fits alone, the likeliest at 0.
 
         A fit may end at a kink above the least cost, never below it: the costs are those of their
         lower hull, less the mean height of the fits above it. Their root is linear between the
         fits, and is extrapolated beyond the last fits. A separate fit is at most as likely as the
         best fit.
         """
+        every = self.prior.lags
         hull = _lower_hull(self.lags, self.costs)
         likely = self.costs < _LIKELY
         rough = float(np.mean((self.costs - hull)[likely]))
@@ -245,25 +273,26 @@ class LagProfile:
         for end, at in ((0, 0), (1, -1)):
             if self.fits[at] is not self.best:
                 slopes[end] = roots[at] / abs(self.lags[at] - centre)
-        root = np.interp(LAGS, self.lags, roots)
-        before, after = self.lags[0] - LAGS, LAGS - self.lags[-1]
+        root = np.interp(every, self.lags, roots)
+        before, after = self.lags[0] - every, every - self.lags[-1]
         root = root + slopes[0] * np.maximum(before, 0.0) + slopes[1] * np.maximum(after, 0.0)
         log = -0.5 * root**2 / (_DEPENDENT * max(self.best.inflation, 1.0))
         for one in self.apart:
             rise = max(one.cost(self.inflation) - self.best.cost(self.inflation), 0.0)
-            log = np.logaddexp(log, -0.5 * (rise + ((LAGS - one.lag) / self.deviation) ** 2))
+            log = np.logaddexp(log, -0.5 * (rise + ((every - one.lag) / self.deviation) ** 2))
         return np.asarray(log)
 
     def along(self, numbers: Mapping[PosteriorFit, float], slope: float) -> _Array:
-        """Interpolate a number of the fits at each of `LAGS`.
+        """Interpolate a number of the fits at each lag.
 
         Beyond the fits it has the `slope` of the linear model of the likeliest fit.
         """
-        values = np.interp(LAGS, self.lags, [numbers[one] for one in self.fits])
-        values += slope * np.minimum(LAGS - self.lags[0], 0.0)
-        values += slope * np.maximum(LAGS - self.lags[-1], 0.0)
+        every = self.prior.lags
+        values = np.interp(every, self.lags, [numbers[one] for one in self.fits])
+        values += slope * np.minimum(every - self.lags[0], 0.0)
+        values += slope * np.maximum(every - self.lags[-1], 0.0)
         for one in self.apart:
-            values[np.abs(LAGS - one.lag) < _NEAR * self.deviation] = numbers[one]
+            values[np.abs(every - one.lag) < _NEAR * self.deviation] = numbers[one]
         return values
 
 

@@ -41,6 +41,7 @@ from valve_friction_ros.identification.engine.intervals import (
     reported_numbers,
 )
 from valve_friction_ros.identification.engine.lags import LagPrior, LagProfile
+from valve_friction_ros.identification.engine.levels import curve_of_levels
 from valve_friction_ros.identification.engine.moving_part import MovingPart, moving_part
 from valve_friction_ros.identification.engine.posterior_fit import PosteriorFit
 from valve_friction_ros.identification.engine.search import Prior, posteriors_at, search
@@ -66,6 +67,7 @@ from valve_friction_ros.identification.trust.plausible_units import (
 from valve_friction_ros.identification.trust.uncertainty import (
     COMPARABLE,
     CORRELATION,
+    NORMAL_QUANTILE,
     SPEED_EXPONENT,
     Correlation,
     correlation_of,
@@ -156,10 +158,12 @@ def _identified(
         )
     uniform = measured(recording)
     require_moving_stem(uniform, valve, settings, recording.stamped is not None)
-    part = moving_part(stamped_record(recording))
+    stamped = stamped_record(recording)
+    part = moving_part(stamped)
     record = part.record
-    lag = lag_prior_of(settings, profile)
+    lag = lag_prior_of(settings, profile, record)
     curves = friction_curves(record, valve, lag, known_of(settings))
+    levels = curve_of_levels(stamped, valve)
     balanced, departed = curve_numbers(curves), None
     if settings.fixed.get("spring_constant") != 0.0:
         departed = static_friction(record, valve, balanced, lag)
@@ -169,10 +173,13 @@ def _identified(
         outcome = _of_simulation(record, valve, settings, profile, curves, balanced, static)
     except RefusalError as refusal:
         if not _dissipates(balanced):
-            raise
+            if levels is None:
+                raise
+            curves, balanced = [levels], dict(levels.numbers)
         force = float(np.ptp(valve.force_per_drive * record.drive.value))
         outcome = _of_force_balance(curves, balanced, settings, str(refusal), force)
-    outcome = _with_departures(outcome, departed)
+    by_sample = curves[0].by_sample if curves and lag.deviation is None else 0.0
+    outcome = _as_sampled(_with_departures(outcome, departed), record, by_sample, levels)
     published, beside = published_beside(uniform, valve, settings)
     misfit = outcome.misfit
     return Result(
@@ -278,7 +285,7 @@ def _of_simulation(
             "the forces with and against the motion do not differ significantly: check that both "
             "signals belong to this machine, and that it has no spring"
         )
-    prior = prior_of(settings, profile, valve)
+    prior = prior_of(settings, profile, valve, record)
     fits = search(fitted_record(record, valve), prior, curves, static)
     fit, numbers = fits[0], estimated(fits, numbers_of(profile), prior.lag)
     misfit = verdicts.fit_misfit(fit, numbers, profile)
@@ -291,9 +298,9 @@ def _of_simulation(
             "buffer and record again"
         )
     if profile.has_imperfections:
-        follows = not verdicts.split_doubt(fits, misfit, profile)
+        follows = not verdicts.split_doubt(fits, misfit, profile, prior.lag.reach)
         if follows:
-            balanced = timed_numbers(curves, LagProfile.of(fits))
+            balanced = timed_numbers(curves, LagProfile.of(fits, prior.lag))
         numbers = checked_by_curve(numbers, balanced, follows, fit.at["slip_force"])
         if "mass" in numbers and not prior.lag.is_known:
             # Seen late by τ, a spring seems to have the mass k·τ²/2: what a shift leaves of a lag.
@@ -303,7 +310,7 @@ def _of_simulation(
         misfit = verdicts.fit_misfit(fit, numbers)
     imperfections = estimated(fits, found_sizes, prior.lag)
     return _Outcome(
-        parameters=verdicts.fit_verdicts(fits, numbers, settings, misfit, profile),
+        parameters=verdicts.fit_verdicts(fits, numbers, settings, misfit, profile, prior.lag.reach),
         numbers=numbers,
         misfit=misfit,
         sliding_speed=_sliding_speed(fit, curves),
@@ -346,6 +353,42 @@ def _with_departures(outcome: _Outcome, departed: Departed | None) -> _Outcome:
             f"the static friction is taken from {departed.departures} breakaways of the stem from "
             "rest",
         ),
+    )
+
+
+def _as_sampled(
+    outcome: _Outcome, record: StampedRecord, by_sample: float, levels: FrictionCurve | None
+) -> _Outcome:
+    """Doubt the friction that a lag of one sample would move, and compare it with the levels.
+
+    No lag affects the levels. Where the sliding friction agrees with theirs, the narrower interval
+    holds; that of the moves includes the difference where a lag of one sample matters (`by_sample`,
+    N). Where it does not agree, the levels are more probable, and the interval includes both.
+    """
+    interval = max(record.drive.period, record.position.period)
+    doubted = verdicts.doubted_by_sampling(outcome.parameters, by_sample, interval)
+    if levels is None:
+        return outcome._replace(parameters=doubted)
+    level, reason = levels.numbers[SLIDING], verdicts.BY_LEVELS
+    known = outcome.numbers.get(SLIDING)
+    if known is not None and known is not level and known.value > 0:
+        apart = abs(known.value - level.value)
+        if apart <= math.hypot(known.half_width, level.half_width):
+            if abs(by_sample) > known.half_width:
+                of_levels = math.hypot(apart, NORMAL_QUANTILE * level.record)
+                known = replace(known, half_width=math.hypot(known.half_width, of_levels))
+            if known.half_width <= level.half_width:
+                level = known
+            reason = "" if outcome.misfit.describes else outcome.parameters[SLIDING].reason
+        else:
+            level = replace(level, half_width=max(level.half_width, apart))
+            reason = verdicts.unlike_levels(known.value)
+    return outcome._replace(
+        parameters={
+            **doubted,
+            SLIDING: verdicts.judged(SLIDING, level, level.half_width, reason),
+        },
+        numbers={**outcome.numbers, SLIDING: level},
     )
 
 
@@ -429,14 +472,15 @@ def prior_of(
     settings: IdentificationSettings,
     profile: Profile = Profile.PLANT,
     valve: Valve | None = None,
+    record: StampedRecord | None = None,
 ) -> Prior:
-    """Return the prior knowledge of any valve, or of the `valve` given."""
+    """Return the prior knowledge of any valve and record, or of those given."""
     known = known_of(settings)
     area = 0.0
     if valve is not None and settings.assumed_mass == IdentificationSettings.assumed_mass:
         area = valve.diaphragm_area or 0.0
     mass = known.get("mass", settings.assumed_mass)
-    return Prior(lag_prior_of(settings, profile), mass, known, profile, area)
+    return Prior(lag_prior_of(settings, profile, record), mass, known, profile, area)
 
 
 def numbers_of(profile: Profile) -> NumbersAt:
@@ -450,10 +494,15 @@ def known_of(settings: IdentificationSettings) -> dict[str, float]:
     return {name: value for name, value in settings.fixed.items() if name in REGRESSED}
 
 
-def lag_prior_of(settings: IdentificationSettings, profile: Profile = Profile.PLANT) -> LagPrior:
-    """Return the prior of the lag between the signals."""
+def lag_prior_of(
+    settings: IdentificationSettings,
+    profile: Profile = Profile.PLANT,
+    record: StampedRecord | None = None,
+) -> LagPrior:
+    """Return the prior of the lag between the signals, of any record or of the one given."""
     timing = settings.timing_uncertainty
-    return LagPrior(0.0 if timing is None and not profile.has_imperfections else timing)
+    deviation = 0.0 if timing is None and not profile.has_imperfections else timing
+    return LagPrior(deviation) if record is None else LagPrior.of(deviation, record)
 
 
 def _balanced_model(
@@ -550,15 +599,14 @@ def expected_half_widths(
         "start_position": start,
     }
     stamped = stamped_record(recording)
-    fits = posteriors_at(
-        fitted_record(stamped, valve), prior_of(settings, valve=valve), truth, with_competitors
-    )
-    numbers: Mapping[str, Estimated] = estimated(fits, lag=lag_prior_of(settings))
+    prior = prior_of(settings, Profile.PLANT, valve, stamped)
+    fits = posteriors_at(fitted_record(stamped, valve), prior, truth, with_competitors)
+    numbers: Mapping[str, Estimated] = estimated(fits, lag=prior.lag)
     if with_competitors:
-        curves = friction_curves(stamped, valve, lag_prior_of(settings), known_of(settings))
+        curves = friction_curves(stamped, valve, prior.lag, known_of(settings))
         numbers = checked_by_curve(
             numbers,
-            timed_numbers(curves, LagProfile.of(fits)),
+            timed_numbers(curves, LagProfile.of(fits, prior.lag)),
             follows=True,
             slip_force=truth["slip_force"],
         )

@@ -31,7 +31,7 @@ from valve_friction_ros.identification.engine.fitted_record import (
 )
 from valve_friction_ros.identification.engine.friction_curve import FrictionCurve
 from valve_friction_ros.identification.engine.intervals import NOISE_LIKE, UNLIKELY
-from valve_friction_ros.identification.engine.lags import LARGEST_LAG, LagPrior
+from valve_friction_ros.identification.engine.lags import LagPrior
 from valve_friction_ros.identification.engine.posterior_fit import PosteriorFit, fit, lag_of
 from valve_friction_ros.identification.refusal import RefusalError
 
@@ -386,7 +386,7 @@ class _Search:
         nearest_to_none = min([best, *found], key=lambda one: abs(one.lag))
         if abs(nearest_to_none.lag) > 0.5 * _first_step(best) and self.may_go_on:
             found.append(self.without_lag(best, nearest_to_none.at))
-        is_possible = best.lag + _delay(best) < LARGEST_LAG
+        is_possible = best.lag + _delay(best) < self.prior.lag.reach
         if follows and is_possible and "viscous_friction" in best.names and self.may_go_on:
             found.append(self.behind_slow_sensor(best))
         return found
@@ -397,7 +397,7 @@ class _Search:
         last, step = best, _first_step(best)
         for _ in range(_PROFILE):
             lag = last.lag + way * step
-            if not (self.may_go_on and abs(lag) < LARGEST_LAG):
+            if not (self.may_go_on and abs(lag) < self.prior.lag.reach):
                 break
             start = self.along(best, last.at, lag)
             found.append(self.fit(start, best.names, _PROFILE_STEPS, self.exact, lag))

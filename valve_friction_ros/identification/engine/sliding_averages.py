@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from valve_friction_ros.identification.engine.lags import LAGS, LARGEST_LAG
+from valve_friction_ros.identification.engine.lags import LARGEST_LAG, LagPrior
 from valve_friction_ros.identification.trust.uncertainty import MEDIAN_MAGNITUDE
 from valve_friction_ros.model.recording import StampedRecord, StampedSignal
 from valve_friction_ros.model.valve import Valve
@@ -50,8 +50,6 @@ _MARGIN = 2.0
 slides."""
 
 _TINY = float(np.finfo(float).tiny)
-WORK_LAGS: _Array = LAGS[::10]
-"""Lags, s, at which the work is computed."""
 
 _SURE_MOVE, _OF_RANGE, _LARGEST_MOVE = 6.0, 5e-3, 0.25
 """Least move that has a speed, in deviations of the noise of a move and as a share of the stem's
@@ -266,14 +264,18 @@ class Averages(NamedTuple):
 
 
 def averages_of(
-    force: MeasuredSignal, stem: MeasuredSignal, valve: Valve, averaging_time: float
+    force: MeasuredSignal,
+    stem: MeasuredSignal,
+    valve: Valve,
+    averaging_time: float,
+    lag: LagPrior,
 ) -> Averages | None:
     """Average a record; None where too few averages are of a stem that clearly slides."""
     begin, end = max(force.time[0], stem.time[0]), min(force.time[-1], stem.time[-1])
     step = max(min(force.period, stem.period), averaging_time / 24.0)
     time = np.arange(begin, end, step)
     length = max(round(averaging_time / step), 1)
-    lost = round(LARGEST_LAG / step) + 2 * length
+    lost = round(lag.reach / step) + 2 * length
     if time.size < 2 * lost + _FEWEST:
         return None
     position = [averaged_twice(half, length) for half in stem.halves(time)]
@@ -418,7 +420,8 @@ class Work(NamedTuple):
     their noise is independent of that of the force, so it biases nothing. `noise`, N, combines the
     effect of chance on the work, half the effect of averaging over twice the time, and the
     uncertainty of the distance; `rounding`, N, is the effect of the force's converter. `speed` is
-    the mean speed over the distance, m/s.
+    the mean speed over the distance, m/s. `by_lag` is the work, N, where the stem is seen late by
+    each of the `lags`, s, and `by_sample` its `larger_change` by a sample.
     """
 
     time: _Array
@@ -429,10 +432,14 @@ class Work(NamedTuple):
     noise: float
     speed: float
     rounding: float = 0.0
-    by_lag: _Array = WORK_LAGS
+    lags: _Array = np.empty(0)
+    by_lag: _Array = np.empty(0)
+    by_sample: float = 0.0
 
     @classmethod
-    def of(cls, force: MeasuredSignal, stem: MeasuredSignal, averages: Averages) -> "Work":
+    def of(
+        cls, force: MeasuredSignal, stem: MeasuredSignal, averages: Averages, lag: LagPrior
+    ) -> "Work":
         """Take strokes and stops from the `averages`."""
         step = min(force.period, stem.period)
         time = np.arange(averages.time[0], averages.time[-1], step)
@@ -462,7 +469,13 @@ class Work(NamedTuple):
         of_path = path.deviation / path.distance * work.of_friction
         noise = math.hypot(work.noise, 0.5 * hidden, of_path)
         rounding = work_of_rounding(force, time, work.along)
-        return work._replace(noise=noise, rounding=rounding).seen_late()
+        return work._replace(
+            noise=noise,
+            rounding=rounding,
+            lags=lag.work_lags,
+            by_lag=np.array([work.late_by(one) for one in lag.work_lags]),
+            by_sample=larger_change(work.late_by, max(force.period, stem.period)),
+        )
 
     @property
     def of_friction(self) -> float:
@@ -470,13 +483,19 @@ class Work(NamedTuple):
         moving = self.along != 0.0
         return float(self.along[moving] @ _off_line(self.force[moving], self.position[moving]))
 
-    def seen_late(self) -> "Work":
-        """Compute the work per distance, N, if the stem is seen late by each of the lags."""
-        seen = [
-            float(self.along @ np.interp(self.time - lag, self.time, self.force))
-            for lag in WORK_LAGS
-        ]
-        return self._replace(by_lag=np.array(seen))
+    def late_by(self, lag: float) -> float:
+        """Compute the work per distance, N, if the stem is seen late by a lag, s."""
+        return float(self.along @ np.interp(self.time - lag, self.time, self.force))
+
+
+def larger_change(late_by: Callable[[float], float], period: float) -> float:
+    """Return the larger change of a force, N, if the stem is seen a `period`, s, late or early.
+
+    It is 0 where usual lags include that.
+    """
+    if period <= LARGEST_LAG:
+        return 0.0
+    return max((late_by(lag) - late_by(0.0) for lag in (period, -period)), key=abs)
 
 
 def work_of_rounding(force: MeasuredSignal, time: _Array, along: _Array) -> float:

@@ -325,12 +325,14 @@ def fit_verdicts(
     settings: IdentificationSettings,
     misfit: Misfit,
     profile: Profile = Profile.PLANT,
+    reach: float = LARGEST_LAG,
 ) -> dict[str, Parameter]:
     """Return every reported number of the first fit with its verdict.
 
     Where the model is doubted, no number is more than weak. Where the misfit of a plant exceeds
     noise, or the search ended before it tried other lags, the numbers of the force balance
-    (`checked_by_curve`) may still be identified.
+    (`checked_by_curve`) may still be identified. Lags beyond the `reach` of their prior, s, are not
+    believed.
     """
     fit, doubt = fits[0], ""
     force_range = float(np.ptp(fit.model.record.force))
@@ -340,7 +342,7 @@ def fit_verdicts(
             f"{two_digits(misfit.systematic * 1e6)} µm of the misfit is more than noise"
         )
     top = _top_speed(fit)
-    slow, split = _slow_doubt(top), split_doubt(fits, misfit, profile)
+    slow, split = _slow_doubt(top), split_doubt(fits, misfit, profile, reach)
     unseen = _unseen(fit, numbers, settings, split)
     verdicts = {}
     for name, one in numbers.items():
@@ -390,7 +392,43 @@ def _no_surer_than_its_spring(verdicts: dict[str, Parameter]) -> dict[str, Param
     return {**verdicts, "spring_preload": weak}
 
 
-def split_doubt(fits: Sequence[PosteriorFit], misfit: Misfit, profile: Profile) -> str:
+BY_LEVELS = "it follows from the levels at which force and stem rest, and no move confirms it"
+
+
+def unlike_levels(value: float) -> str:
+    """Say that the moves between levels show another sliding friction, N."""
+    return (
+        f"the moves between the levels show {value:.3g} N, the levels at which force and stem rest "
+        "another value: one signal may be recorded late"
+    )
+
+
+def doubted_by_sampling(
+    parameters: Mapping[str, Parameter], change: float, interval: float
+) -> dict[str, Parameter]:
+    """Return the verdicts, with friction at most weak where the order of the samples decides it.
+
+    A slow historian reads its signals in turn: one may be as old as a sampling `interval`, s, which
+    makes a `change`, N, of the sliding friction.
+    """
+    sliding = parameters[SLIDING]
+    if abs(change) <= sliding.half_width:
+        return dict(parameters)
+    reason = (
+        f"one signal recorded a sample ({interval:.2g} s) late would change the sliding friction "
+        f"by {abs(change):.3g} N; set timing_uncertainty, 0 if both signals are sampled together"
+    )
+    return {
+        name: replace(one, verdict=Verdict.WEAK, reason=reason)
+        if name in (SLIDING, *_BY_SPEED) and one.verdict is Verdict.IDENTIFIED
+        else one
+        for name, one in parameters.items()
+    }
+
+
+def split_doubt(
+    fits: Sequence[PosteriorFit], misfit: Misfit, profile: Profile, reach: float
+) -> str:
     """Return why the simulated stem determines no more than the force balance does, if so.
 
     The residual of a plant exceeds noise, the lag is impossible, or the search could not trade
@@ -403,7 +441,7 @@ def split_doubt(fits: Sequence[PosteriorFit], misfit: Misfit, profile: Profile) 
             f"{two_digits(1e6 * misfit.systematic)} µm of the deviation is more than noise): the "
             "sliding friction is reliable, its components are not"
         )
-    if abs(best.lag) >= LARGEST_LAG:
+    if abs(best.lag) >= reach:
         return (
             f"the best fit puts the signals {1e3 * abs(best.lag):.0f} ms apart, which is not "
             "plausible: something else in the motion looks like a lag"
