@@ -10,10 +10,9 @@
 """The pages hold what the code declares, draw each room, and have nothing that axe-core faults."""
 
 import ast
+import contextlib
 import re
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -23,6 +22,7 @@ from extension.diagnostic_keys import declared_keys, entries, is_explained
 from extension.history_schema import schema, schema_as_markdown
 from extension.meanings import meanings, require_all
 from extension.node_parameters import parameter_entries, parameters_as_markdown
+from kept_rows import run_here
 
 from valve_friction_ros.settings import NODES
 
@@ -112,9 +112,14 @@ def test_a_name_without_a_meaning_is_refused():
     }
 
 
-@pytest.mark.parametrize("width", [390, 1400])
+@pytest.fixture(scope="module")
+def browser():
+    with chromium() as one:
+        yield one
+
+
 @pytest.mark.parametrize("name", ["index", "how_to/dashboards", "reference/diagnostics"])
-def test_axe_finds_nothing_wrong_with_a_built_page(name, width):
+def test_axe_finds_nothing_wrong_with_a_built_page(browser, name):
     """A page of each kind, as the last `make docs` has built it with the style of now."""
     built = PROJECT / "build" / "docs"
     styles = [Path("_static") / file for file in ("site.css", "site.js")]
@@ -124,10 +129,11 @@ def test_axe_finds_nothing_wrong_with_a_built_page(name, width):
         for one in styles
     ):
         pytest.skip("the documentation is not built with the style of now: run `make docs`")
-    with chromium() as browser:
-        page = browser.new_page(viewport={"width": width, "height": 900})
+    with contextlib.closing(browser.new_page()) as page:
         page.goto((built / f"{name}.html").as_uri())
-        assert axe_violations(page) == []
+        for width in (390, 1400):
+            page.set_viewport_size({"width": width, "height": 900})
+            assert axe_violations(page) == [], width
 
 
 SOURCES = PROJECT / "valve_friction_ros"
@@ -191,36 +197,23 @@ EXAMPLES = PROJECT / "examples"
 
 
 @pytest.fixture(scope="module")
-def browser():
-    with chromium() as one:
-        yield one
-
-
-@pytest.fixture(params=[(1400, "light"), (390, "light"), (1400, "dark")], ids=str)
-def report_page(browser, request):
-    width, theme = request.param
-    size = {"width": width, "height": 900}
-    one = browser.new_page(viewport=size, color_scheme=theme, bypass_csp=True)
-    yield one
-    one.close()
-
-
-@pytest.fixture(scope="module")
 def reports(tmp_path_factory):
     """A folder with two recordings, one of which is refused, and what is written of it."""
     folder = tmp_path_factory.mktemp("plant")
     shutil.copy(EXAMPLES / "five_seconds.csv", folder / "FV-101.csv")
     (folder / "FV-102.csv").write_text("time_s,pressure_pa,position_m\n0,1,1\n1,1,1\n")
-    valve = ["--valve", str(EXAMPLES / "fv_101.yaml")]
-    words = ["identify-folder", folder, *valve, "--output", folder / "plant.html"]
-    command = [sys.executable, "-m", "valve_friction_ros", *words]
-    subprocess.run(command, check=False, timeout=300)
+    valve = ["--valve", EXAMPLES / "fv_101.yaml"]
+    run_here(["identify-folder", folder, *valve, "--output", folder / "plant.html"])
     return folder
 
 
-def test_pages_of_a_folder_and_of_its_valves(report_page, reports):
+def test_pages_of_a_folder_and_of_its_valves(browser, reports):
     found = sorted(reports.rglob("*.html"))
     assert len(found) >= 2
-    for path in found:
-        report_page.goto(path.as_uri())
-        assert axe_violations(report_page) == [], path.name
+    with contextlib.closing(browser.new_page(bypass_csp=True)) as page:
+        for path in found:
+            page.goto(path.as_uri())
+            for width, theme in ((1400, "light"), (390, "light"), (1400, "dark")):
+                page.set_viewport_size({"width": width, "height": 900})
+                page.emulate_media(color_scheme=theme)
+                assert axe_violations(page) == [], (path.name, width, theme)

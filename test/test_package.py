@@ -110,20 +110,19 @@ def exec_depends():
 def third_party_imports():
     """Modules from outside the package and Python, with the files that import them."""
     own = set(sys.stdlib_module_names) | {NAME}
-    for path in [*(PROJECT / NAME).rglob("*.py"), *(PROJECT / "launch").glob("*.py")]:
-        for module in imported_modules(path) - own:
-            yield module, path
+    paths = [*(PROJECT / NAME).rglob("*.py"), *(PROJECT / "launch").glob("*.py")]
+    return [(module, path) for path in paths for module in imported_modules(path) - own]
 
 
 def test_manifest_names_every_message_package_and_library():
     declared = exec_depends()
     assert not [key for key in declared if key.endswith("-pip")]
-    imported = {module for module, _ in third_party_imports()}
-    assert imported >= LIBRARIES.keys() | BAG_LIBRARIES.keys()
+    imports = third_party_imports()
+    assert {module for module, _ in imports} >= LIBRARIES.keys() | BAG_LIBRARIES.keys()
     assert {key for key in declared if key.startswith("python3-")} == {
         key for key, _ in LIBRARIES.values()
     }
-    for module, path in third_party_imports():
+    for module, path in imports:
         if module in BAG_LIBRARIES:
             assert path.parent == PROJECT / NAME / "records" / "bags"
         elif module in DATABASE_LIBRARIES:

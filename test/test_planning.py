@@ -246,7 +246,7 @@ def test_limits_hold_for_every_pattern(shapes, speeds, hold, duration):
 
 
 SETTINGS = IdentificationSettings(assumed_mass=1.6)
-CONDITIONS = Conditions(sample_rate=50.0)
+CONDITIONS = Conditions(sample_rate=25.0)
 QUICK = Limits(0.2, 0.8, duration=30.0)
 SEARCH_SPRING = (HIGH_FRICTION.spring_constant, HIGH_FRICTION.spring_preload)
 KNOWN = frictions(viscous_friction=4.48e4, spring=SEARCH_SPRING)
@@ -308,7 +308,7 @@ def test_the_aim_decides():
 
 def test_unknown_friction_has_a_useful_test_for_every_packing():
     unknown = unknown_friction(BENCH_VALVE, SEARCH_SPRING, 1.6)
-    found = plan_test(BENCH_VALVE, unknown, Limits(), CONDITIONS, SETTINGS)
+    found = plan_test(BENCH_VALVE, unknown, Limits(duration=30.0), CONDITIONS, SETTINGS)
     moving = [one.relative("coulomb_friction") for one in found.forecasts if not one.refusal]
     assert len(moving) >= 2
     assert max(moving) < 0.2
@@ -325,7 +325,7 @@ def test_a_friction_that_holds_the_stem_is_named_and_not_refused():
 def test_an_end_that_the_atmosphere_sets_is_said():
     """Against F_c = 606 N the spring alone does not bring the stem down to 2 %."""
     for lowest, is_said in ((0.02, True), (0.2, False)):
-        limits = Limits(lowest, 0.6, duration=30.0, allow_stops=True)
+        limits = Limits(lowest, 0.6, duration=20.0, allow_stops=True)
         found = plan_test(BENCH_VALVE, KNOWN_EXACTLY, limits, CONDITIONS, SETTINGS)
         said = "the lower end is atmospheric pressure" in " ".join(plan_remarks(found))
         assert said is is_said
@@ -370,7 +370,7 @@ def test_refusals_name_what_to_relax():
 def test_forecasts_are_what_the_method_reports(true, names):
     """At the valve itself; the median of three seeds of the noise, each another one."""
     wave = SquareWave(8e4, 1.5e5, 9.0)
-    record, _ = moved(wave, 40.0, BENCH_VALVE, true, CONDITIONS)
+    record, _ = moved(wave, 40.0, BENCH_VALVE, true, Conditions(sample_rate=50.0))
     results = [
         identify(SensorNoise(10e-6, 100.0, seed).applied_to(record), BENCH_VALVE, SETTINGS)
         for seed in (77, 78, 79)

@@ -168,6 +168,22 @@ def test_a_model_that_does_not_describe_the_valve_comes_first(with_friction, ide
     assert diagnosis_sentence(excessive).startswith(f"{doubt}is excessive, ")
 
 
+@pytest.mark.parametrize(
+    ("friction", "baseline", "status"),
+    [
+        (150.0, None, (Colour.GREY, "Unknown", "no baseline to compare the friction with")),
+        (100.0, BASELINE, (Colour.GREEN, "Friction normal")),
+        (150.0, BASELINE, (Colour.AMBER, "Friction has grown", "maintenance required (NE 107: M)")),
+        (500.0, BASELINE, (Colour.RED, "Excess friction")),
+    ],
+)
+def test_the_colour_of_the_status_is_that_of_the_diagnosis(
+    with_friction, friction, baseline, status
+):
+    found = identification_report(with_friction(friction, baseline=baseline)).status
+    assert found[: len(status)] == status
+
+
 FRICTION = "Friction compared with its baseline"
 
 

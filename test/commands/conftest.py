@@ -16,8 +16,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from kept_rows import run_here
 
-from valve_friction_ros.commands.main import run
 from valve_friction_ros.model import Recording, SineWave, SquareWave, simulate
 
 PROJECT = Path(__file__).resolve().parents[2]
@@ -41,8 +41,7 @@ def command(capsys):
     """Function of a sub-command and its arguments: exit code, stdout and stderr."""
 
     def command(*arguments):
-        code = run([str(argument) for argument in arguments])
-        return (code, *capsys.readouterr())
+        return (run_here(arguments), *capsys.readouterr())
 
     return command
 

@@ -24,10 +24,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bags import messages_of, write_bag
-from kept_rows import csv_rows, kept, rows_of
+from kept_rows import csv_rows, kept, rows_of, run_here
 from processes import PATIENCE, wait_until
 
-from valve_friction_ros.commands.main import run as run_here
 from valve_friction_ros.identification import IdentificationSettings, identify_bench
 from valve_friction_ros.model import (
     HIGH_FRICTION,
@@ -102,6 +101,7 @@ def start(arguments, script=None):
 
 
 def run(arguments, script=None):
+    """Run the command as a process, which starts more of them."""
     process = start(arguments, script)
     out, err = process.communicate(timeout=PATIENCE)
     return process.returncode, out, err
@@ -197,12 +197,12 @@ def test_the_default_method_with_a_gap(folder, noisy, tmp_path, bench_yaml):
     assert "gap" not in (rows["whole.csv"]["warnings"] or "")
 
 
-def test_killed_and_resumed(fleet, output, arguments):
+def test_killed_and_resumed(fleet, output, arguments, capsys):
     code, _, _ = interrupted(arguments, output, lambda process: process.kill())
     assert code == -signal.SIGKILL
     assert kept(output) == 3
-    code, out, err = run(arguments)
-    assert code == 0, err
+    assert run_here(arguments) == 0
+    out, err = capsys.readouterr()
     assert "6 recordings: 3 done before, 3 to do" in err
     assert [*rows_of(output)][:3] == ["a.csv", "b.csv", "c.csv"]
     assert done(output) == Counter(fleet)

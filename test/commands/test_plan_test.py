@@ -25,7 +25,7 @@ from valve_friction_ros.model import BENCH_VALVE, LOW_FRICTION, simulate
 
 SPRING = ("--spring-constant", "205000", "--spring-preload", "231.65")
 KNOWN = (*SPRING, "--coulomb-friction", "152.7", "--viscous-friction", "4865")
-QUICK = ("--duration", "15", "--from", "40 %", "--to", "60", "--sample-rate", "50")
+QUICK = ("--duration", "15", "--from", "40 %", "--to", "60", "--sample-rate", "40")
 
 
 @pytest.fixture

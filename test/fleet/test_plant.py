@@ -26,7 +26,7 @@ from zoneinfo import ZoneInfo
 import numpy as np
 import pytest
 from browser import Tab, chromium
-from kept_rows import rows_of
+from kept_rows import rows_of, run_here
 from local_server import free_port
 
 from valve_friction_ros import history
@@ -104,9 +104,8 @@ def make_plant(folder, exports, table=TABLE):
 
 def identify(folder, *words):
     """Run `identify-folder` over the exports of a plant, into ``friction.csv``; its exit code."""
-    arguments = (folder / "exports", "--plant", folder / "valves.csv", "--jobs", 1)
-    outputs = ("--output", folder / "friction.csv", *words)
-    return run(["identify-folder", *map(str, arguments), *map(str, outputs)])
+    arguments = (folder / "exports", "--plant", folder / "valves.csv")
+    return run_here(["identify-folder", *arguments, "--output", folder / "friction.csv", *words])
 
 
 @pytest.fixture(scope="module")

@@ -134,7 +134,6 @@ def frozen():
     from valve_friction_ros.nodes.identifier import node
     from valve_friction_ros.nodes.plumbing import running
 
-    running.arm.__defaults__ = (2.0,)
     running._ANSWER = 2.0
     running._SILENCE = running._AGAIN = 0.5
     lock = ctypes.PyDLL(None).pthread_mutex_lock  # holds Python's lock, as rclpy does
@@ -149,8 +148,12 @@ def frozen():
 
         return call
 
+    def poll(self):
+        running.arm.__defaults__ = (2.0,)  # not before: a start takes longer on a busy machine
+        turn(self)
+
     one = node.Identifier
-    one.poll = freezing(LOOP, one.poll)
+    turn, one.poll = freezing(LOOP, one.poll), poll
     one.create_publisher = freezing(MIDDLEWARE, one.create_publisher)
     one.destroy_node = freezing(CLEAN_UP, one.destroy_node)
     return node

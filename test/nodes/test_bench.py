@@ -262,7 +262,7 @@ def test_jitter_is_of_the_time_alone_and_bounded(live):
 
 
 HOME = 1e5
-ROWS = ((0.0, HOME), (0.5, HOME), (2.5, 1.4e5), (600.0, 1.4e5))
+ROWS = ((0.0, HOME), (0.2, HOME), (1.2, 1.4e5), (600.0, 1.4e5))
 PLAYER = f"{NAMESPACE}/stroke_player"
 
 

@@ -14,13 +14,15 @@ import signal
 import subprocess
 import sys
 import time
+from functools import partial
 from pathlib import Path
 
 import pytest
-from faulty_identifier import faulty
+from faulty_identifier import FINISH, faulty
 from live_nodes import NAMESPACE, PROJECT
 from records import quick_record
 
+from valve_friction_ros.commands.main import run
 from valve_friction_ros.model import HIGH_FRICTION
 
 
@@ -44,13 +46,29 @@ def ended(process):
 
 @pytest.fixture(scope="module")
 def bench(shared):
-    """Function of arguments: exit code, stdout and stderr of the command beside an identifier."""
-    shared.start_identifier()
-    return shared.client, lambda *arguments: ended(start(shared.domain, *arguments))
+    """A domain with an identifier, which does not end an identification without a file."""
+    (shared.folder / FINISH).touch()
+    shared.start_identifier(script=faulty("slow"))
+    return shared
 
 
-def test_all_services(bench):
-    client, call = bench
+@pytest.fixture
+def call(monkeypatch, capsys):
+    """Function of a domain and arguments: exit code, stdout and stderr of the command, run here."""
+
+    def call(domain, *arguments):
+        monkeypatch.setenv("ROS_DOMAIN_ID", str(domain.number))
+        try:
+            code = run(["call", *arguments])
+        except SystemExit as end:
+            code = end.code
+        return (code, *capsys.readouterr())
+
+    return call
+
+
+def test_all_services(bench, call):
+    client, call = bench.client, partial(call, bench.domain)
     assert call("fv_101", "clear") == (
         0,
         "the buffer is empty; the estimate and the baseline are kept\n",
@@ -87,8 +105,8 @@ def test_all_services(bench):
         (["/fv_101", "xyz"], "clear"),  # of all services
     ],
 )
-def test_refused_in_one_line(bench, arguments, line):
-    code, out, err = bench[1](*arguments)
+def test_refused_in_one_line(bench, call, arguments, line):
+    code, out, err = call(bench.domain, *arguments)
     assert (code, out) == (2, "")
     assert err.startswith("valve_friction call: ")
     assert line in err
@@ -98,18 +116,23 @@ def test_refused_in_one_line(bench, arguments, line):
 
 
 @pytest.fixture
-def busy(live):
-    """A domain with an identifier whose identification does not end."""
-    live.start_identifier(script=faulty("slow"))
-    live.client.fill(quick_record())
-    return live
+def busy(bench):
+    """The same domain, where an identification does not end before the test."""
+    client, finish = bench.client, bench.folder / FINISH
+    assert client.trigger("clear").success
+    client.fill(quick_record())
+    finish.unlink()
+    yield bench
+    finish.touch()
+    if bench.nodes[0].is_running():
+        client.wait_until(lambda: client.trigger("identify").success, "the end of it")
 
 
 def test_the_timeout_ends_the_command_and_the_node_goes_on(busy):
-    assert ended(start(busy.domain, NAMESPACE, "identify", "--timeout", "3")) == (
+    assert ended(start(busy.domain, NAMESPACE, "identify", "--timeout", "2")) == (
         2,
         "",
-        "valve_friction call: /fv_101/identifier/identify has not answered within 3 s; it is "
+        "valve_friction call: /fv_101/identifier/identify has not answered within 2 s; it is "
         "still running; allow more time with --timeout\n",
     )
     assert busy.client.trigger("identify").message.startswith(
@@ -137,6 +160,12 @@ def test_interrupted_while_it_waits(busy):
     )
 
 
+def test_nobody_is_there(live, call):
+    code, out, err = call(live.domain, "/fv_101", "identify", "--timeout", "1")
+    assert (code, out) == (2, "")
+    assert "there is no identifier at all: start one, or set its ROS_DOMAIN_ID" in err
+
+
 def test_the_node_ends_meanwhile(busy):
     process = waiting(busy)
     busy.nodes[0].stop()
@@ -145,9 +174,3 @@ def test_the_node_ends_meanwhile(busy):
         "",
         "valve_friction call: /fv_101/identifier ended before it answered\n",
     )
-
-
-def test_nobody_is_there(live):
-    code, out, err = ended(start(live.domain, "/fv_101", "identify", "--timeout", "1"))
-    assert (code, out) == (2, "")
-    assert "there is no identifier at all: start one, or set its ROS_DOMAIN_ID" in err

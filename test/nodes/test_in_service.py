@@ -39,9 +39,9 @@ def strokes(count, samples=64):
     return np.concatenate([one if n % 2 == 0 else TRAVEL - one for n in range(count)])
 
 
-def send(client, position, start=START):
-    client.send(position=(start + PERIOD * np.arange(position.size), position))
-    return start + PERIOD * position.size
+def send(client, position, start=START, period=PERIOD):
+    client.send(position=(start + period * np.arange(position.size), position))
+    return start + period * position.size
 
 
 def shown(client, key, value):
@@ -116,8 +116,9 @@ def test_a_node_that_is_stopped_keeps_all(live, history):
 def test_a_warning_of_a_packing_outlives_a_rest_and_a_restart(live, history):
     """While the valve rests the expected date recedes; only a renewed packing ends the warning."""
     client = live.client_of_identifier({"reversal_limit": 500.0})
-    samples = 2 * DAY // PERIOD + 256
-    after = send(client, np.tile(strokes(2, samples=512), -(-samples // 1024))[:samples])
+    samples = DAY // (2 * PERIOD) + 64  # two days
+    position = np.tile(strokes(2, samples=128), -(-samples // 256))[:samples]
+    after = send(client, position, period=4 * PERIOD)
     status = client.next_status(lambda one: "packing life" in one.message, "a warning")
     assert status.level == WARN
     rest = after + 600 * SECOND * np.arange(1, 1500)

@@ -355,10 +355,16 @@ def test_ctrl_c_leaves_an_identification_that_does_not_return(live):
     assert time.monotonic() - begin < WITHIN + 1.0
 
 
-def frozen_end(live, tmp_path, what):
-    """Freeze an identifier within C; return its process when it has ended, and the time it took."""
+def frozen_end(live, tmp_path, what, silence):
+    """Freeze an identifier within C; return its process when it has ended, and the time it took.
+
+    Before, its inputs are silent for so many seconds, in which it asks the middleware.
+    """
     process = live.start("identifier", script=faulty("frozen"))
     live.client.next_status()
+    if silence:
+        live.client.spin(silence)
+        live.client.next_status()
     live.client.watched.clear()
     live.nodes.remove(process)
     (tmp_path / "draft").write_text(what)
@@ -374,29 +380,20 @@ def frozen_end(live, tmp_path, what):
 
 
 @pytest.mark.parametrize(
-    ("what", "where"),
+    ("what", "where", "silence"),
     [
-        (LOOP, "in _run"),
-        (MIDDLEWARE, "in _end_if_the_middleware_hangs"),
-        (CLEAN_UP, "in _run_until"),
+        (LOOP, "in _run", 0.0),
+        (MIDDLEWARE, "in _end_if_the_middleware_hangs", 4.0),
+        (CLEAN_UP, "in _run_until", 0.0),
     ],
 )
-def test_a_process_that_is_frozen_within_c_ends_by_itself(live, tmp_path, what, where):
-    process, lasted = frozen_end(live, tmp_path, what)
+def test_a_process_that_is_frozen_within_c_ends_by_itself(live, tmp_path, what, where, silence):
+    """Silent inputs alone, of which the middleware is asked several times, end nothing."""
+    process, lasted = frozen_end(live, tmp_path, what, silence)
     assert where in process.errors
     assert "Timeout (" in process.errors
     if what == CLEAN_UP:
         assert lasted < WITHIN + 1.0
-
-
-def test_silent_inputs_alone_end_nothing(live):
-    """The middleware is asked several times, and answers."""
-    process = live.start("identifier", script=faulty("frozen"))
-    live.client.next_status()
-    begin = time.monotonic()
-    live.client.wait_until(lambda: time.monotonic() > begin + 4.0, "four seconds")
-    process.require_running()
-    live.client.next_status()
 
 
 NUMBERS = {"position_noise": Measured(1e-6, 1e-7)}

@@ -9,6 +9,8 @@
 
 """Recorded topics and saved buffers: the command reads out of them what the node found."""
 
+import contextlib
+import io
 import json
 import math
 import re
@@ -22,14 +24,14 @@ import numpy as np
 import pytest
 import yaml
 from faulty_identifier import FINISH, FULL, SLOW, faulty
-from live_nodes import NAMESPACE, NODE, PROJECT, SECOND, STREAM, SimulatedClock, stamp_of, stamps_of
-from processes import ran
+from live_nodes import NAMESPACE, NODE, SECOND, STREAM, SimulatedClock, stamp_of, stamps_of
 from rclpy.duration import Duration
 from records import quick_record
 from rosbags.rosbag2 import Reader
 from sensor_msgs.msg import FluidPressure, JointState
 from std_srvs.srv import Trigger
 
+from valve_friction_ros.commands.main import run as command
 from valve_friction_ros.identification import UNITS
 from valve_friction_ros.model import BENCH_VALVE
 from valve_friction_ros.streams import RecordBuffer
@@ -48,10 +50,10 @@ class Run(NamedTuple):
 
 
 def identified(*arguments):
-    """The one JSON object of the command, run as a person would."""
-    done = ran("identify", "--json", *arguments, cwd=PROJECT)
-    assert done[::2] == (0, "")
-    return json.loads(done[1])
+    """The one JSON object of the command."""
+    with contextlib.redirect_stdout(io.StringIO()) as printed:
+        assert command(["identify", "--json", *map(str, arguments)]) == 0
+    return json.loads(printed.getvalue())
 
 
 def numbers_of(answer):

@@ -9,6 +9,7 @@
 
 """How nodes start: what they load, what they refuse in one line, and what they say of a start."""
 
+import json
 import os
 import signal
 import socket
@@ -22,6 +23,7 @@ from live_nodes import NAMESPACE, NODE, PROJECT, Domain, NodeProcess, values_of
 from local_server import free_port
 from processes import ran
 
+from benchmark.harness.processes import parameters as as_arguments
 from valve_friction_ros.records.files import data_folder
 
 PLAYED = str(PROJECT / "test/nodes/played_pressure.csv")
@@ -104,29 +106,53 @@ def ended(tmp_path):
     domain.release()
 
 
-def refused(ended, *arguments):
+def only_line(ended):
     """The one line by which a node refuses to start."""
-    code, errors = ended(*arguments)
+    code, errors = ended
     assert code == 2, errors
     (line,) = errors.splitlines()
     assert line.startswith("cannot start: ")
     return line
 
 
+STARTS = """
+import json, os, sys
+from valve_friction_ros.nodes import start
+codes, ends = [], []
+os._exit = ends.append
+for place, (node, words) in enumerate(json.loads(sys.argv[1])):
+    os.dup2(os.open(f"{place}.err", os.O_WRONLY | os.O_CREAT), 2)
+    sys.argv[1:] = words
+    getattr(start, node)()
+    codes.append(ends[-1])
+print(json.dumps(codes))
+"""
+
+
+@pytest.fixture(scope="module")
+def wrong_starts(tmp_path_factory):
+    """Exit code and errors of each wrong start, one after the other in one process."""
+    folder, place = tmp_path_factory.mktemp("starts"), ["--ros-args", "-r", f"__ns:={NAMESPACE}"]
+    starts = [(node, place + as_arguments(**given)) for node, given, _ in REFUSED.values()]
+    code, out, error = ran(json.dumps(starts), program=("-c", STARTS), cwd=folder)
+    assert code == 0, error
+    errors = [(folder / f"{number}.err").read_text() for number in range(len(starts))]
+    return dict(zip(REFUSED, zip(json.loads(out), errors, strict=True), strict=True))
+
+
 @pytest.mark.parametrize("name", REFUSED)
-def test_a_wrong_start_is_refused_in_one_line(ended, name):
-    node, parameters, words = REFUSED[name]
-    if node == "dashboard":
+def test_a_wrong_start_is_refused_in_one_line(wrong_starts, name):
+    if REFUSED[name][0] == "dashboard":
         pytest.importorskip("nicegui", reason="NiceGUI is not installed")
-    line = refused(ended, node, parameters)
-    assert words in line
+    line = only_line(wrong_starts[name])
+    assert REFUSED[name][2] in line
     assert "s3cret" not in line
 
 
 def test_a_file_of_parameters_is_checked_too(ended, tmp_path):
     path = tmp_path / "valves.yaml"
     path.write_text("/**:\n  ros__parameters:\n    pressure_referense: 0.0\n")
-    line = refused(ended, "identifier", {}, ["--params-file", str(path)])
+    line = only_line(ended("identifier", arguments=["--params-file", str(path)]))
     assert "parameter 'pressure_referense': did you mean 'pressure_reference'?" in line
     path.write_text(
         "/**:\n  ros__parameters:\n    travel: -1.0\n"

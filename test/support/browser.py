@@ -37,9 +37,10 @@ def chromium():
 class Tab:
     """A tab of the browser, and what went wrong in it: errors, and requests to other machines."""
 
-    def __init__(self, browser, address, width=1400, height=900):
+    def __init__(self, browser, address):
         self.address = address
-        self.page = browser.new_page(viewport={"width": width, "height": height})
+        self.page = browser.new_page()
+        self.page.set_viewport_size({"width": 1400, "height": 900})
         self.page.set_default_timeout(TIMEOUT)
         self.errors, self.strangers, self.dialogs = [], [], []
         self.page.on("pageerror", lambda error: self.errors.append(str(error)))

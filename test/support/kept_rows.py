@@ -7,12 +7,28 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The rows that `identify-folder` has on the disk, while it runs and at its end."""
+"""`identify-folder` without processes, and the rows that it has on the disk."""
 
 import contextlib
 import csv
 import shutil
 import sqlite3
+
+import pytest
+
+from valve_friction_ros.commands import identify_folder
+from valve_friction_ros.commands.main import run
+
+
+def _in_turn(work, tasks, _processes, _stopped):
+    return ((task, work(task)) for task in tasks)
+
+
+def run_here(arguments):
+    """Run the command without a process that identifies, whose start takes a second."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(identify_folder, "in_processes", _in_turn)
+        return run([str(argument) for argument in arguments])
 
 
 def csv_rows(path):
