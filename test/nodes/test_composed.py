@@ -293,9 +293,7 @@ def test_a_clean_up_ends_an_identification(live, compose, monkeypatch, kind):
     assert not node.failures
 
 
-def test_a_configuration_that_waits_for_a_server_lets_the_executor_continue(
-    live, compose, tmp_path
-):
+def test_a_server_that_does_not_answer_never_stops_the_executor(live, compose, tmp_path):
     """The server accepts a connection and never says anything."""
     pytest.importorskip("psycopg", reason="run `make venv-database`")
     client, turns = live.client, []
@@ -312,6 +310,9 @@ def test_a_configuration_that_waits_for_a_server_lets_the_executor_continue(
             begun = time.monotonic()
             assert change(client, Transition.TRANSITION_CONFIGURE)
             assert time.monotonic() - begun > 3.5
+            cleaned = time.monotonic()
+            assert change(client, Transition.TRANSITION_CLEANUP)
+            assert time.monotonic() - cleaned < 1.0
         assert sum(one > begun for one in turns) > 20
         other.destroy_node()
 

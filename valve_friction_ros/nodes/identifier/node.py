@@ -204,7 +204,7 @@ class Identifier(ManagedNode):
         """Take the rows of the valve from the server, which may be away, before `configure`."""
         with contextlib.suppress(ValueError, HistoryError):  # `configure` tells them
             if (sender := sender_with_rows(self, self._tag)) is not None:
-                self.opened.callback(sender.end)
+                self.opened_before.callback(sender.end)
 
     def configure(self) -> None:
         """Create all parts that monitor the valve, from the parameters."""
