@@ -348,7 +348,7 @@ class Identifier(ManagedNode):
 
     def _on_time_jump(self, jump: TimeJump) -> None:
         seconds = jump.delta.nanoseconds / 1e9
-        cause = said(Code.TIME_JUMPED, seconds=seconds) if seconds else said(Code.CLOCK_CHANGED)
+        cause = said(Code.TIME_JUMPED, seconds=-seconds) if seconds else said(Code.CLOCK_CHANGED)
         self._inputs.take(is_all=True)
         self._monitor.buffer.clear(cause)
         self._quality.forget_stamps()
