@@ -188,8 +188,9 @@ def test_a_refused_node_leaves_the_graph(compose, kind, wrong, words):
     watcher.destroy_node()
 
 
-def test_a_step_that_outlasts_the_end_is_no_bug(compose, monkeypatch, capfd):
-    """As of the first sample, while its libraries are loaded on a busy machine."""
+@pytest.mark.parametrize("ends", ["node", "rclpy"])
+def test_a_step_that_outlasts_the_end_is_no_bug(compose, monkeypatch, capfd, ends):
+    """As of the first sample, while its libraries are loaded on a busy machine, or at Ctrl-C."""
     monkeypatch.setattr(polled_node, "_STEP_PATIENCE", 0.01)
     begun, destroyed = threading.Event(), threading.Event()
 
@@ -204,9 +205,13 @@ def test_a_step_that_outlasts_the_end_is_no_bug(compose, monkeypatch, capfd):
     node.alive = node.create_publisher(Empty, "alive", 1)
     node.poll_guarded()
     assert begun.wait(60)
-    node.destroy_node()
+    if ends == "node":
+        node.destroy_node()
+    else:
+        compose.context.shutdown()
     destroyed.set()
     node._thread.join(60)
+    assert not node._thread.is_alive()
     assert not node.failures
     assert "internal error" not in capfd.readouterr().err
 
