@@ -301,6 +301,9 @@ def test_a_bench_with_its_identifier_and_without(launch_file, with_identifier):
     assert nodes["simulator"]["parameters"] == [config, time]
     if with_identifier == "true":
         assert nodes["identifier"]["parameters"] == [{"valve_tag": "FV-102"}, config, time]
+    given["valve"] = "9bad"
+    with pytest.raises(ValueError, match=r"valve '9bad' is not a ROS namespace: use .*:=fv_101"):
+        names["nodes"](context)
 
 
 @pytest.mark.parametrize(("name", "typed"), [("bench", "valv"), ("monitor", "one_proces")])

@@ -183,15 +183,18 @@ class Code(Enum):
         "baseline, or the stem is blocked; {advice}"
     )
     # The samples of a valve
-    BUFFER_CLEARED = "{because}: the buffer was cleared"
+    BUFFER_CLEARED = "the buffer was cleared: {because}"
     CLEARED_ON_REQUEST = "on request"
     CLEARED_AS_SETTINGS = "valve or window parameters were changed"
     CLEARED_AS_RECORD_BEGINS = "a new record begins"
     CLEARED_AS_STAMPS_GO_BACK = "time stamps go backwards: the buffer is cleared"
     STAMPS_WENT_BACK = "the time stamps of {signal} jumped back by {seconds:.3g} s"
-    TIME_JUMPED = "ROS time jumped by {seconds:.3g} s"
+    TIME_JUMPED = (
+        "the time on /clock jumped back by {seconds:.3g} s; if a bag is played in a loop, identify "
+        "shortly before it begins again"
+    )
     CLOCK_CHANGED = "use_sim_time was changed"
-    TIME_JUMPS = "ROS time jumps"
+    TIME_JUMPS = "the time on /clock jumps back"
     SAMPLE_DAMAGED = "{signal} is damaged"
     SAMPLE_NO_JOINT = "{signal} has no position for the joint"
     SAMPLE_NOT_FINITE = "{signal} is not finite"

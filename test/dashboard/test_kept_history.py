@@ -27,6 +27,7 @@ from valve_friction_ros.health import (
     AlarmAction,
     AlarmKind,
     AlarmRequest,
+    AlarmState,
     Baseline,
     Condition,
     Level,
@@ -40,6 +41,7 @@ from valve_friction_ros.history import (
     follow_alarms,
     history_mark,
     keep_usage,
+    read_alarms,
     request_alarms,
 )
 from valve_friction_ros.history.copying import PARTS, rows_of, write_rows
@@ -210,6 +212,22 @@ def test_without_an_identifier_an_alarm_comes_back_when_its_shelving_ends(file, 
         assert [one.state.value for one in heard.view.alarms] == [state]
     (newest, *_) = alarm_events(file)
     assert (newest.event.action, newest.event.time) == (AlarmAction.EXPIRE, NOW + 60 * SECOND)
+
+
+def test_shelving_ends_on_time_once_the_identifier_is_silent(file, monkeypatch):
+    """A running identifier may live in simulated time, so it ends its shelvings itself."""
+    high, running = AlarmKind.FRICTION_HIGH, {VALVE.name}
+    shown = Condition(Level.WARN, StatusSignal.MAINTENANCE_REQUIRED, "friction has grown")
+    follow_alarms(file, VALVE, {high: shown}, NOW)
+    request_alarms(file, VALVE, high, AlarmRequest(AlarmAction.SHELVE, "A", "", 60.0), NOW)
+    kept = HistoryCache(file.path, running.__contains__)
+    monkeypatch.setattr("time.time_ns", lambda: NOW + 60 * SECOND)
+    kept.refresh()
+    kept.refresh()
+    assert read_alarms(file, VALVE.name)[high].state is AlarmState.SHELVED
+    running.clear()
+    kept.refresh()
+    assert read_alarms(file, VALVE.name)[high].state is AlarmState.UNACKNOWLEDGED
 
 
 def test_it_is_read_while_another_process_writes(file):

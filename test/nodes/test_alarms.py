@@ -9,6 +9,7 @@
 
 """Alarms and baselines over DDS: their life, their answers, and that they outlive a killed node."""
 
+import contextlib
 import math
 import re
 import sqlite3
@@ -35,6 +36,7 @@ from valve_friction_ros.history import (
 from valve_friction_ros.identification import identify
 from valve_friction_ros.model import BENCH_VALVE, HIGH_FRICTION
 from valve_friction_ros.settings import ALARM_KINDS
+from valve_friction_ros.wording import utc_second
 
 TAKEN = " (by the identification of 2023-11-14 22:13 UTC)"
 """What `~/set_baseline` says it took: the stamps of the tests begin at 1.7e9 s."""
@@ -55,14 +57,13 @@ USAGE = (  # of which a kill may cost the last minute
 AGE = re.compile(r" \(identified \d+ (s|min) ago, before the restart\)")
 
 
-def test_an_alarm_outlives_a_kill(live, history):
+def test_an_alarm_outlives_a_kill(live):
     node = live.start_identifier()
     client = live.client
     client.set_baseline(HEALTHY)
     client.identified(TIGHT)
-    before = client.statuses[-1][1]
+    before = state(client, "friction_high", "unacknowledged")
     assert before.level == ERROR
-    client.wait_until(lambda: read_alarms(history, NODE), "the alarm in the file")
     node = live.restart()
     after = client.next_status()
     assert after.level == ERROR
@@ -339,6 +340,21 @@ def test_nobody_is_alerted_while_an_alarm_is_shelved(live):
         ]
 
 
+def test_an_alarm_is_published_once_it_is_on_record(live, history):
+    """A kill between the two would take back what was published."""
+    client = live.client_of_identifier(KNOWN | {"error_ratio": 99.0, "warn_ratio": 98.0})
+    client.identified(TIGHT)
+    with contextlib.closing(sqlite3.connect(history.path, isolation_level=None)) as other:
+        other.execute("BEGIN IMMEDIATE")
+        client.set_parameters(NODE, {"warn_ratio": 1.25})
+        status = client.next_status(lambda one: one.level == WARN, "the level")
+        assert values_of(status)["alarm friction_high"] == "normal"
+        assert not read_alarms(history, NODE)
+    published = values_of(state(client, "friction_high", "unacknowledged"))
+    raised = read_alarms(history, NODE)[AlarmKind.FRICTION_HIGH].raised
+    assert published["alarm friction_high raised [time]"] == utc_second(raised)
+
+
 def test_what_another_process_keeps_is_seen(live, history):
     """The dashboard acknowledges many alarms at once, in the file."""
     client = live.client_of_identifier(KNOWN)
@@ -347,7 +363,6 @@ def test_what_another_process_keeps_is_seen(live, history):
     (valve,) = history.valves()
     request = AlarmRequest(AlarmAction.ACKNOWLEDGE, "A. Operator", "all at once")
     asked = [(valve, AlarmKind.FRICTION_HIGH)]
-    client.wait_until(lambda: read_alarms(history, valve.name), "the alarm in the file")
     assert request_many(history, asked, request, time.time_ns()) == 1
     state(client, "friction_high", "acknowledged")
     client.identified(HEALTHY)

@@ -188,8 +188,9 @@ def test_a_refused_node_leaves_the_graph(compose, kind, wrong, words):
     watcher.destroy_node()
 
 
-def test_a_step_that_outlasts_the_end_is_no_bug(compose, monkeypatch, capfd):
-    """As of the first sample, while its libraries are loaded on a busy machine."""
+@pytest.mark.parametrize("ends", ["node", "rclpy"])
+def test_a_step_that_outlasts_the_end_is_no_bug(compose, monkeypatch, capfd, ends):
+    """As of the first sample, while its libraries are loaded on a busy machine, or at Ctrl-C."""
     monkeypatch.setattr(polled_node, "_STEP_PATIENCE", 0.01)
     begun, destroyed = threading.Event(), threading.Event()
 
@@ -204,9 +205,13 @@ def test_a_step_that_outlasts_the_end_is_no_bug(compose, monkeypatch, capfd):
     node.alive = node.create_publisher(Empty, "alive", 1)
     node.poll_guarded()
     assert begun.wait(60)
-    node.destroy_node()
+    if ends == "node":
+        node.destroy_node()
+    else:
+        compose.context.shutdown()
     destroyed.set()
     node._thread.join(60)
+    assert not node._thread.is_alive()
     assert not node.failures
     assert "internal error" not in capfd.readouterr().err
 
@@ -293,9 +298,7 @@ def test_a_clean_up_ends_an_identification(live, compose, monkeypatch, kind):
     assert not node.failures
 
 
-def test_a_configuration_that_waits_for_a_server_lets_the_executor_continue(
-    live, compose, tmp_path
-):
+def test_a_server_that_does_not_answer_never_stops_the_executor(live, compose, tmp_path):
     """The server accepts a connection and never says anything."""
     pytest.importorskip("psycopg", reason="run `make venv-database`")
     client, turns = live.client, []
@@ -312,6 +315,9 @@ def test_a_configuration_that_waits_for_a_server_lets_the_executor_continue(
             begun = time.monotonic()
             assert change(client, Transition.TRANSITION_CONFIGURE)
             assert time.monotonic() - begun > 1.5
+            cleaned = time.monotonic()
+            assert change(client, Transition.TRANSITION_CLEANUP)
+            assert time.monotonic() - cleaned < 1.0
         assert sum(one > begun for one in turns) > 20
         other.destroy_node()
 

@@ -10,6 +10,7 @@
 """The pages of the dashboard in a real browser, against live nodes."""
 
 import contextlib
+import re
 import time
 import urllib.request
 from pathlib import Path
@@ -510,6 +511,12 @@ def test_an_alarm_of_a_valve_without_alarm_services_is_answered(plant, tab):
     request_many(plant.history, [(valve, AlarmKind.STUCK)], back, time.time_ns())
     card.locator(".vf-alarm", has_text="stuck").wait_for(state="detached")
     assert page.get_by_label("Comment", exact=True).input_value() == "half a sen"
+    page = tab.open("/alarms?area=/crowd&tz=Asia/Tokyo")
+    row = page.locator("tr", has_text="friction high")
+    until = re.compile(r"until \S+ \d\d:\d\d JST$")
+    row.get_by_text(until).wait_for()
+    row.get_by_role("button", name="More").click()
+    page.locator(".vf-dialog-title").get_by_text(until).wait_for()
 
 
 def test_what_cannot_be_called_says_so(tab):

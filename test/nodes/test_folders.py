@@ -10,6 +10,7 @@
 """Where nodes write: within their folder and its room; and what is removed of alarm recordings."""
 
 import errno
+import os
 import re
 from pathlib import Path
 
@@ -89,12 +90,20 @@ def test_an_unknown_home_is_refused():
         pytest.fail("there is no such folder")
 
 
-def test_trouble_with_the_disk_is_refused(tmp_path):
-    with (
-        pytest.raises(RefusalError, match=f"^cannot write a bag into {tmp_path}: No space left"),
-        OutputFolder(str(tmp_path), "saved", "a bag").opened(),
-    ):
-        raise OSError(errno.ENOSPC, "No space left on device")
+@pytest.mark.parametrize(
+    ("number", "told"),
+    [
+        (errno.ENOSPC, "No space left on device: make room on its disk, or choose another folder"),
+        (errno.EACCES, "Permission denied: make it writable for the user of this process, or "
+         "choose another folder"),
+        (errno.EIO, "Input/output error"),
+    ],
+)  # fmt: skip
+def test_trouble_with_the_disk_is_refused(tmp_path, number, told):
+    folder = OutputFolder(str(tmp_path), "saved", "a bag")
+    with pytest.raises(RefusalError) as refused, folder.opened():
+        raise OSError(number, os.strerror(number))
+    assert str(refused.value) == f"cannot write a bag into {tmp_path}: {told}"
 
 
 def test_a_bug_is_not_blamed_on_the_folder(tmp_path):

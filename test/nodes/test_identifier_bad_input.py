@@ -175,7 +175,7 @@ def test_the_log_tells_a_clearing_right_after_a_bad_sample(live):
     client.wait_for_buffered(0)
     client.wait_until(
         lambda: (
-            "stamps of actuator_pressure jumped back by 0.01 s: the buffer was cleared"
+            "the buffer was cleared: the time stamps of actuator_pressure jumped back by 0.01 s"
             in process.errors
         ),
         "the warning",

@@ -256,4 +256,8 @@ def test_simulated_time(live):
     run_until_stamped(1000 * SECOND, 2000 * SECOND)
     response = client.refusal("identify")
     assert "no samples" in response
-    assert "the buffer was cleared: ROS time jumped by -" in response
+    assert re.search(
+        r"the buffer was cleared: the time on /clock jumped back by [45]\.?\d*e\+03 s; if a bag is "
+        r"played in a loop, identify shortly before it begins again",
+        response,
+    )

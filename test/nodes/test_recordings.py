@@ -192,8 +192,10 @@ def start_saving_into(live, folder, **parameters):
 
 def test_what_cannot_be_written_is_told_and_the_node_goes_on(live, tmp_path):
     (tmp_path / "file").write_text("")
-    folders = {"save": (tmp_path / FULL, "a bag", "File too large"),
-               "report": (tmp_path / "file" / "pages", "a report", "Not a directory")}  # fmt: skip
+    folders = {"save": (tmp_path / FULL, "a bag",
+                        "File too large: raise the limit of the size of a file (ulimit -f)"),
+               "report": (tmp_path / "file" / "pages", "a report",
+                          "Not a directory: choose another folder")}  # fmt: skip
     start_saving_into(live, folders["save"][0], report_folder=folders["report"][0])
     for service, (folder, what, reason) in folders.items():
         assert live.client.refusal(service) == f"cannot write {what} into {folder}: {reason}"

@@ -151,7 +151,7 @@ class TestStampsThatGoBack:
         buffer.add_pressure(stamp(500), math.nan)
         cause = f"the time stamps of {NAMES[signal]} jumped back by 0.25 s"
         found = getattr(buffer, f"add_{signal}")(stamp(249), 1e-3)
-        assert str(found) == cause + ": the buffer was cleared"
+        assert str(found) == f"the buffer was cleared: {cause}"
         assert len(buffer) == 0
         snapshot = buffer.snapshot()
         assert snapshot.rejections == ()
@@ -193,7 +193,7 @@ class TestStampsThatWereOvertaken:
 
     def test_further_back_the_clock_has_jumped(self, buffer):
         found = buffer.add_pressure(stamp(199 * self.PERIOD - 7), 1e5)
-        assert str(found).endswith("jumped back by 0.007 s: the buffer was cleared")
+        assert str(found).endswith(" jumped back by 0.007 s")
 
     def test_a_block_without_them_is_what_the_watches_take(self, buffer):
         at = 200 * self.PERIOD + np.array([0, 4, 2, 8, 12, 11, 16])

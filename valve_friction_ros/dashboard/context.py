@@ -35,6 +35,7 @@ from valve_friction_ros.history import (
     request_many,
 )
 from valve_friction_ros.outside_text import printable
+from valve_friction_ros.wording import numbered
 
 if TYPE_CHECKING:
     from valve_friction_ros.dashboard.gate import Guard
@@ -192,17 +193,17 @@ class DashboardContext:
         """Whether identifiers are heard and can be called; else there is only the history."""
         return self.services is not None
 
-    def _may_call(self, node: str, service: str) -> bool:
-        """Return whether the visitor may call a service now, and log who calls it."""
+    def _may_call(self, what: str) -> bool:
+        """Return whether the visitor may call something now, and log who calls it."""
         if not self.visitors.may_operate():
             return False
         if name := self.visitors.name():
-            self.log(f"{name} calls {printable(node)}/{printable(service)}")
+            self.log(f"{name} calls {printable(what)}")
         return True
 
     async def call(self, node: str, service: str) -> Answer:
         """Call a service of an identifier, or return a refusal."""
-        if not self._may_call(node, service):
+        if not self._may_call(f"{node}/{service}"):
             return _NOT_ALLOWED
         if self.services is None:
             return Answer(False, _NOTHING_HEARD)
@@ -217,7 +218,7 @@ class DashboardContext:
         process with many valves offers no alarm services, but follows that file. Without such a
         file it goes through the identifier, or, if none is heard, through the history on a server.
         """
-        if not self._may_call(node, _ALARM_SERVICES[request.action][0]):
+        if not self._may_call(f"{node}/{_ALARM_SERVICES[request.action][0]}"):
             return _NOT_ALLOWED
         return await self._answer(node, kind, self._signed(request))
 
@@ -247,7 +248,8 @@ class DashboardContext:
         self, alarms: Sequence[tuple[KeptValve, AlarmKind]], request: AlarmRequest
     ) -> Answer:
         """Make a request on many alarms at once, through the history or the identifiers."""
-        if not self.visitors.may_operate():
+        service = _ALARM_SERVICES[request.action][0]
+        if not self._may_call(f"{service} for {numbered(len(alarms), 'alarm')}"):
             return _NOT_ALLOWED
         file, now, signed = self.history.file, time.time_ns(), self._signed(request)
         if file is None or (self.services is not None and not self.history.is_file):
@@ -264,9 +266,6 @@ class DashboardContext:
         """Make a request for each alarm: valves in parallel, alarms of one valve in turn."""
         by_valve: defaultdict[str, list[AlarmKind]] = defaultdict(list)
         for valve, kind in alarms:
-            # Only here, not in the tasks below, is the visitor known.
-            if not self._may_call(valve.name, _ALARM_SERVICES[request.action][0]):
-                return _NOT_ALLOWED
             by_valve[valve.name].append(kind)
 
         async def of_valve(node: str, kinds: list[AlarmKind]) -> list[Answer]:

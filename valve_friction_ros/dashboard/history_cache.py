@@ -18,7 +18,7 @@ import math
 import threading
 import time
 from collections import OrderedDict, defaultdict, deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from statistics import fmean, median
 from typing import TYPE_CHECKING, NamedTuple
@@ -114,10 +114,19 @@ class HistoryCache:
     `refresh` and `valve` read the file, so call them in a worker thread; the cached contents are
     available at once. A read error becomes the `problem`, and earlier contents remain. A server may
     be slow: `refresh` queries it in another thread and does not wait. Without a place there is no
-    history, and no `file`.
+    history, and no `file`. `refresh` also ends shelving where no identifier does it.
+
+    Parameters
+    ----------
+    place : Path or HistoryServer or None
+        The history.
+    is_followed : callable
+        Returns whether an identifier of this name runs, which acts for the clock on its alarms.
     """
 
-    def __init__(self, place: Place | None) -> None:
+    def __init__(
+        self, place: Place | None, is_followed: Callable[[str], bool] = lambda _: False
+    ) -> None:
         self.file = None if place is None else database.History(place)
         self._path = place if isinstance(place, Path) else None  # None: nothing, or a server
         self._asking: threading.Thread | None = None
@@ -133,6 +142,9 @@ class HistoryCache:
         )
         self._sparks: dict[str, Sparkline | None] = {}
         self._histories: OrderedDict[str, ValveHistory | None] = OrderedDict()
+        self._is_followed = is_followed
+        self._ends: dict[KeptValve, int] = {}
+        """Earliest end of shelving or time out of service of each valve, ns."""
         self.valves: tuple[KeptValve, ...] = ()
         self.problem: str | None = None if place else "no history_file is named: nothing is kept"
         self.revision = 0
@@ -154,12 +166,16 @@ class HistoryCache:
 
     def _refresh(self) -> bool:
         with self._lock:
-            if self.file is None or not self._may_be_new():
+            if self.file is None:
+                return False
+            self._end_suppressions(self.file)
+            if not self._may_be_new():
                 return False
             since = time.time_ns() - _SPARK_DAYS * DAY
             try:
                 mark = database.history_mark(self.file)
                 if self._mark is None or mark.alarm_event != self._mark.alarm_event:
+                    self._ends = database.suppression_ends(self.file)
                     self.alarm_revision += 1
                 if self._mark is not None and mark.database != self._mark.database:
                     self._begin_anew()
@@ -186,6 +202,14 @@ class HistoryCache:
             self.valves = valves  # last: other threads must find the rest complete
             self.revision += 1
             return True
+
+    def _end_suppressions(self, file: database.History) -> None:
+        """Write what the clock does to alarms, where no identifier does it."""
+        now = time.time_ns()
+        for valve in [one for one, end in self._ends.items() if end <= now]:
+            if not self._is_followed(valve.name):
+                with contextlib.suppress(AlarmError, HistoryError):  # not ours to write
+                    database.follow_alarms(file, valve, {}, now)
 
     def _may_be_new(self) -> bool:
         """Return whether there may be new rows; start again if the file has been replaced."""
@@ -307,11 +331,8 @@ class KeptValves(HistoryCache):
         self._told = (-1, -1)
         self._read: HistoryMark | None = None
         self._statuses: dict[KeptValve, list[Status]] = {}
-        self._ends: dict[KeptValve, int] = {}
-        """Earliest end of shelving or time out of service of each valve, ns."""
 
     def _refresh(self) -> bool:
-        self._end_suppressions()
         is_new = super()._refresh()
         state = (self.revision, self.alarm_revision)
         if state != self._told and self.problem is None:
@@ -321,13 +342,6 @@ class KeptValves(HistoryCache):
             except HistoryError as error:
                 self.problem, self._told = str(error), (-1, -1)
         return is_new
-
-    def _end_suppressions(self) -> None:
-        """Write what the clock does to alarms, which an identifier would do."""
-        now = time.time_ns()
-        for valve in [one for one, end in self._ends.copy().items() if end <= now]:
-            with contextlib.suppress(AlarmError, HistoryError):  # not ours to write
-                database.follow_alarms(self._history, valve, {}, now)
 
     def _tell(self) -> None:
         """Pass on the statuses of all valves; an alarm event alone rereads no histories."""
@@ -343,8 +357,6 @@ class KeptValves(HistoryCache):
                     found = database.valve_histories(self._history, (valve,), 0, END_OF_TIME)
                     self._statuses[valve] = [_status_of(one) for one in found]
                 alarms = database.read_alarms(self._history, valve.name)
-                ends = (one.until for one in alarms.values() if one.until is not None)
-                self._ends[valve] = min(ends, default=END_OF_TIME)
                 statuses = [_with_alarms(one, alarms) for one in self._statuses[valve]]
             except (ValueError, TypeError, KeyError) as error:
                 signal = {"NE 107": StatusSignal.CHECK_FUNCTION.value}

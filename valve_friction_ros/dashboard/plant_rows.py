@@ -43,12 +43,17 @@ def zone_asked(query: Mapping[str, str], usual: str) -> ZoneInfo:
         return zone_of(usual)
 
 
-def moment(stamp: int | None, zone: ZoneInfo) -> str:
+def moment(stamp: int | None, zone: ZoneInfo, form: str = "%Y-%m-%d %H:%M:%S") -> str:
     """Write a time, ns since 1970, in a zone, with the abbreviation of the zone."""
     if stamp is None:
         return "–"
     local: datetime = utc(stamp).astimezone(zone)
-    return f"{local:%Y-%m-%d %H:%M:%S} {local.tzname()}"
+    return f"{local:{form}} {local.tzname()}"
+
+
+def minute(stamp: int | None, zone: ZoneInfo) -> str:
+    """Write a time as `moment` does, to the minute."""
+    return moment(stamp, zone, "%Y-%m-%d %H:%M")
 
 
 def ago(seconds: float) -> str:

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
         read_alarms as read_alarms,
         request_alarms as request_alarms,
         request_many as request_many,
+        suppression_ends as suppression_ends,
     )
     from valve_friction_ros.history.copying import (
         CopiedPart as CopiedPart,

@@ -296,6 +296,19 @@ def read_alarms(file: History, valve: str) -> dict[AlarmKind, Alarm]:
         return {} if found is None else _alarms_of(connection, found)
 
 
+def suppression_ends(history: History) -> dict[KeptValve, int]:
+    """Return when the next shelving or time out of service of each valve ends, ns."""
+    valve, until = tables.valve.c, sa.func.min(_EVENT.c.until_ns)
+    query = (
+        sa.select(valve.name, valve.tag, until)
+        .select_from(joined(_EVENT, tables.valve))
+        .where(_EVENT.c.id.in_(_newest()), _EVENT.c.until_ns.is_not(None))
+        .group_by(valve.name, valve.tag)
+    )
+    with reading(history.place) as connection:
+        return {KeptValve(name, tag): end for name, tag, end in connection.execute(query)}
+
+
 # Lists
 
 

@@ -374,6 +374,7 @@ class Dashboard(ManagedNode):
         self.plant = Plant(self.options.silence)
         self.calls = ServiceCalls()
         self.signals = WatchedSignals(self._sources_of)
+        self._begun = time.monotonic()
         self.begin()
 
     def configure(self) -> None:
@@ -387,6 +388,13 @@ class Dashboard(ManagedNode):
     def _sources_of(self, identifier: str) -> StreamNames:
         heard = self.plant.valve(identifier, time.monotonic())
         return StreamNames() if heard is None else heard.view.sources
+
+    def may_be_heard(self, identifier: str) -> bool:
+        """Return whether an identifier is heard, or this node has only just begun to listen."""
+        now = time.monotonic()
+        heard = self.plant.valve(identifier, now)
+        is_heard = heard is not None and not heard.is_silent
+        return is_heard or now < self._begun + self.options.silence
 
     def poll(self) -> None:
         """Process the diagnostics received and the requests of the pages."""
@@ -462,7 +470,7 @@ def _serve(node: Dashboard, limited: contextlib.ExitStack) -> int:
     except (*WRONG_REQUESTS, OSError) as error:
         stop.is_followed = True
         return cannot_start(error)
-    history = HistoryCache(options.history)
+    history = HistoryCache(options.history, node.may_be_heard)
     context = DashboardContext(
         options, node.plant, history, visitors, log, node.calls.call, node.signals
     )

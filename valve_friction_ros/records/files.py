@@ -14,6 +14,7 @@ addresses of the stores from its own environment variables and configuration fil
 """
 
 import contextlib
+import errno
 import os
 import re
 from collections.abc import Iterator
@@ -74,6 +75,24 @@ def table_stem(path: Path) -> str:
 def cause_of(error: Exception) -> str:
     """Return the message of the system for a system error, else the message of the error."""
     return str((isinstance(error, OSError) and error.strerror) or error)
+
+
+_WRITABLE = "make it writable for the user of this process, or choose another folder"
+_REMEDIES_OF_DISK = {
+    errno.ENOSPC: "make room on its disk, or choose another folder",
+    errno.EDQUOT: "make room, or raise the quota of the user of this process",
+    errno.EFBIG: "raise the limit of the size of a file (ulimit -f)",
+    errno.EACCES: _WRITABLE,
+    errno.EPERM: _WRITABLE,
+    errno.EROFS: "choose another folder",
+    errno.ENOTDIR: "choose another folder",
+}
+
+
+def disk_trouble(error: OSError) -> str:
+    """Return why something was not written, with the remedy if one is known."""
+    remedy = _REMEDIES_OF_DISK.get(error.errno or 0)
+    return cause_of(error) + (f": {remedy}" if remedy else "")
 
 
 _REMEDY = "S3 needs `pip install s3fs 'universal_pathlib>=0.3.10,<0.4'` (the extra `stores`)"

@@ -25,7 +25,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from valve_friction_ros.outside_text import page_environment
-from valve_friction_ros.records.files import write_whole
+from valve_friction_ros.records.files import disk_trouble, write_whole
 
 _SYMBOL = re.compile(r"(?<![\w.])([FPRSTakv]|σ|R²)_(ref|[a-z0-9])(?!\w|\.\w)")
 _MINUS = re.compile(r"(?<![\w.-])-(?=\d)")
@@ -209,7 +209,7 @@ def require_report_file(path: Path) -> None:
         with tempfile.TemporaryFile(dir=path.parent):
             pass
     except OSError as error:
-        cause = error.strerror or error
+        cause = disk_trouble(error)
         raise ValueError(f"{path}: cannot write into {path.parent}: {cause}") from None
 
 

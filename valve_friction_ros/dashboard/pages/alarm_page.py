@@ -33,7 +33,7 @@ from valve_friction_ros.dashboard.pages.theme import (
     search_field,
     text,
 )
-from valve_friction_ros.dashboard.plant_rows import address_of, moment
+from valve_friction_ros.dashboard.plant_rows import address_of, minute, moment
 from valve_friction_ros.health.alarms import (
     TRANSITIONS,
     Alarm,
@@ -80,6 +80,12 @@ _LASTING = frozenset({AlarmAction.SHELVE, AlarmAction.TAKE_OUT})
 def _possible(alarm: Alarm) -> tuple[AlarmAction, ...]:
     """Return the actions that an alarm allows now."""
     return tuple(one for one in _ACTIONS if (alarm.state, one) in TRANSITIONS)
+
+
+def _state(alarm: Alarm, zone: ZoneInfo) -> str:
+    """Return the state of an alarm, with the end of a suppression."""
+    end = "" if alarm.until is None else f" until {minute(alarm.until, zone)}"
+    return f"{alarm.state.value}{end}"
 
 
 @dataclass(frozen=True)
@@ -164,13 +170,13 @@ def _row(number: int, one: KeptAlarmEvent, zone: ZoneInfo, href: str, is_journal
         "area": printable(one.area, 120),
         "kind": alarm.kind.words,
         "state": alarm.state.value,
-        "until": "" if alarm.until is None else moment(alarm.until, zone)[:16],
+        "until": "" if alarm.until is None else minute(alarm.until, zone),
         "css": level.name.lower() if alarm.is_told else "unknown",
         "level": level.name if alarm.is_active else "",
         "advice": alarm.advice if alarm.is_told else "",
         "say": printable(alarm.message, 300),
         "when": moment(event.time, zone),
-        "raised": moment(alarm.raised, zone)[:16],
+        "raised": minute(alarm.raised, zone),
         "by": printable(by, 120),
         "text": printable(event.text, 500),
         "can": [] if is_journal else [a.name for a in _possible(alarm)],
@@ -351,7 +357,8 @@ class _AlarmPage:
         if (one := next(some, None)) is None:
             return
         alarm = one.event.alarm
-        title = f"{printable(one.valve.tag, 80)}, {alarm}"
+        state = _state(alarm, self._page.zone)
+        title = f"{printable(one.valve.tag, 80)}, {alarm.kind.words}: {state}"
         may, who = _possible(alarm), self._context.visitors.name()
         chosen = next((action for action in may if action.name == name), None)
         if name and chosen is None:
@@ -409,8 +416,7 @@ class AlarmStates:
         kind = one.kind
         with element("div", "vf-alarm"):
             chip(css, kind.words)
-            end = "" if one.until is None else f" until {moment(one.until, self._zone)[:16]}"
-            ui.label(one.state.value + end)
+            ui.label(_state(one, self._zone))
             if self._context.visitors.may_operate():
                 may, acknowledge = _possible(one), AlarmAction.ACKNOWLEDGE
                 ask = partial(self._ask, kind.words, kind, may)

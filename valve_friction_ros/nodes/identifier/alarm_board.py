@@ -103,6 +103,7 @@ class AlarmBoard:
         self._identified: int | None = None
         self.is_requested = False
         self._under_way: _Step | None = None
+        self._on_record = dict(self.alarms)
         if not node.tells_parameters:
             return  # a request needs the parameter alarm_who
         for name, action in (
@@ -177,6 +178,8 @@ class AlarmBoard:
             self._under_way = None
         if self._under_way is None:
             self.alarms |= self._history.alarm_news()
+        if self._under_way is None or self._history.path is None or self._history.problems:
+            self._on_record = dict(self.alarms)
 
     def _frictions(self, renewal: int) -> dict[AlarmKind, Condition]:
         """Update the friction conditions after a new identification or new moves."""
@@ -243,10 +246,14 @@ class AlarmBoard:
             events, self.alarms = step.made.events, dict(step.made.alarms)
             self._under_way = None  # it was made earlier
         self._take(events)
+        self._on_record = dict(self.alarms)
         return "; ".join(str(one.alarm) for one in events) + self._history.reservation
 
     # Diagnostics
 
     def values(self) -> dict[str, str]:
-        """Return the state of each alarm, with details of those that are not normal."""
-        return alarm_values(self.alarms)
+        """Return the state of each alarm, with details of those that are not normal.
+
+        A state is published once it is in the history: a kill then takes nothing back.
+        """
+        return alarm_values(self._on_record)

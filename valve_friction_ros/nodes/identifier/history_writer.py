@@ -225,7 +225,7 @@ class HistoryWriter:
         if self._claim is not None:
             self._claim.release()
         if self._sender is not None:
-            self._sender.end()
+            self._writer.submit(self._sender.end)  # it waits a little for the server
             self._sender = None
 
     def values(self) -> dict[str, str]:

@@ -204,7 +204,7 @@ class Identifier(ManagedNode):
         """Take the rows of the valve from the server, which may be away, before `configure`."""
         with contextlib.suppress(ValueError, HistoryError):  # `configure` tells them
             if (sender := sender_with_rows(self, self._tag)) is not None:
-                self.opened.callback(sender.end)
+                self.opened_before.callback(sender.end)
 
     def configure(self) -> None:
         """Create all parts that monitor the valve, from the parameters."""
@@ -348,7 +348,7 @@ class Identifier(ManagedNode):
 
     def _on_time_jump(self, jump: TimeJump) -> None:
         seconds = jump.delta.nanoseconds / 1e9
-        cause = said(Code.TIME_JUMPED, seconds=seconds) if seconds else said(Code.CLOCK_CHANGED)
+        cause = said(Code.TIME_JUMPED, seconds=-seconds) if seconds else said(Code.CLOCK_CHANGED)
         self._inputs.take(is_all=True)
         self._monitor.buffer.clear(cause)
         self._quality.forget_stamps()

@@ -35,6 +35,7 @@ from valve_friction_ros.nodes.plumbing.output_folder import OutputFolder, free_p
 from valve_friction_ros.nodes.plumbing.processes import give_back_memory, imported
 from valve_friction_ros.nodes.plumbing.worker import InternalError, Worker, bugs_reported
 from valve_friction_ros.records.bags.topics import StreamNames, bag_libraries
+from valve_friction_ros.records.files import disk_trouble
 from valve_friction_ros.settings import IDENTIFICATION
 from valve_friction_ros.streams import Samples, Snapshot, nanoseconds, utc, utc_second
 
@@ -415,7 +416,7 @@ class AlarmRecorder:
                     return f"{page} does not fit into alarm_megabytes: increase it"
                 remove_oldest(path.parent, valve, most, room, new=path)
             except OSError as error:
-                return f"{page} was not written: {error.strerror or error}"
+                return f"{page} was not written: {disk_trouble(error)}"
             return None
 
         self._page = self._worker.submit(write_page)

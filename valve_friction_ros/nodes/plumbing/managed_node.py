@@ -44,11 +44,13 @@ class ManagedNode(LifecycleNodeMixin, PolledNode):
         Whether the node is configured, and whether it is active.
     opened : contextlib.ExitStack
         Resources that `configure` has opened; closed with the node or by its clean-up.
+    opened_before : contextlib.ExitStack
+        Resources that `await_others` has opened; closed once `configure` has opened its own.
     """
 
     def __init__(self, *arguments: Any, **named: Any) -> None:
         self.is_active = self.is_configured = False
-        self.opened = contextlib.ExitStack()
+        self.opened, self.opened_before = contextlib.ExitStack(), contextlib.ExitStack()
         self._era = object()
         PolledNode.__init__(self, *arguments, **named)
 
@@ -101,7 +103,8 @@ class ManagedNode(LifecycleNodeMixin, PolledNode):
 
     def _configure(self) -> None:
         self._before = {id(one) for one, _ in self._entities()}
-        self.configure()
+        with self.opened_before:
+            self.configure()
         self.is_configured = True
 
     def _entities(self) -> list[tuple[Any, Callable[[Any], object]]]:
@@ -122,6 +125,7 @@ class ManagedNode(LifecycleNodeMixin, PolledNode):
         """Close all resources; the end of a node in any state, and of what its callbacks await."""
         self.is_active = self.is_configured = False
         self._era = object()
+        self.opened_before.close()
         self.opened.close()
 
     def _dissolve(self) -> None:

@@ -22,7 +22,7 @@ from rclpy.node import Node
 
 from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.nodes.plumbing.worker import done_in
-from valve_friction_ros.records.files import data_folder
+from valve_friction_ros.records.files import data_folder, disk_trouble
 from valve_friction_ros.streams import utc
 
 _BLOCK = 4096
@@ -102,9 +102,8 @@ class OutputFolder:
                 )
             yield self._folder
         except OSError as error:
-            cause = error.strerror or error
             raise RefusalError(
-                f"cannot write {self._content} into {self._folder}: {cause}"
+                f"cannot write {self._content} into {self._folder}: {disk_trouble(error)}"
             ) from None
 
     async def kept(

@@ -297,11 +297,16 @@ class PolledNode(Node):
     def guarded(self, work: str) -> Iterator[None]:
         """Confine a bug in some work to this node: log it once, and let the process continue.
 
-        The bug is in `failures` until work of the same name succeeds.
+        The bug is in `failures` until work of the same name succeeds. Work that the end of rclpy
+        interrupts has no bug.
         """
         try:
             with bugs_reported(self, known=self._failures.get(work)):
-                yield
+                try:
+                    yield
+                except RuntimeError:  # RCLError, which is not public
+                    if self.context.ok():
+                        raise
         except (InternalError, RefusalError) as error:
             self._failures[work] = str(error)
         else:
@@ -355,7 +360,7 @@ class PacedNode(PolledNode):
             self._thread.join(_STEP_PATIENCE)
 
     def _take_steps(self) -> None:
-        while not self._has_ended:
+        while not self._has_ended and self.context.ok():
             following = time.monotonic() + _STEP_PATIENCE
             with self.guarded("step"):
                 try:
