@@ -278,7 +278,8 @@ def test_a_life_of_an_alarm(live, history):
     assert raised["alarm friction_high level"] == "ERROR"
     assert raised["alarm friction_high message"].startswith("excess friction")
     refused = client.trigger("acknowledge")
-    assert (refused.success, refused.message) == (False, "who is empty: state your name")
+    message = "the parameter alarm_who is empty: set it to your name"
+    assert (refused.success, refused.message) == (False, message)
     answer = ask(client, "acknowledge", text="repack on Monday")
     assert (answer.success, answer.message) == (True, "friction high: acknowledged")
     live.restart(KNOWN)

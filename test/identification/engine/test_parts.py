@@ -83,7 +83,10 @@ class TestLagPrior:
             prior = LagPrior.of(stated, record)
             assert prior.reach == prior.lags[-1] == -prior.lags[0] == reach
             assert prior.lags[prior.lags.size // 2] == 0.0
-            assert np.isin(prior.work_lags, prior.lags).all()
+        odd = LagPrior(1.0, 1.2033)
+        assert odd.lags[0] == odd.work_lags[0] == -1.2033
+        assert odd.lags[-1] == odd.work_lags[-1] == 1.2033
+        assert odd.work_lags[odd.work_lags.size // 2] == 0.0
 
     def test_stated(self):
         """A Gaussian."""

@@ -287,6 +287,20 @@ def _set_anew(
     return anew, leaving
 
 
+def _require_enough(positions: int, inside: int) -> None:
+    """Refuse a record with few positions, in all or `inside` the time of both signals."""
+    if positions < _FEWEST:
+        raise RefusalError(
+            f"the record has only {positions} positions, a repeated value taken once (at least "
+            f"{_FEWEST} are needed): record longer, or sample faster"
+        )
+    if inside < _FEWEST:
+        raise RefusalError(
+            f"the two signals overlap in only {inside} positions (at least {_FEWEST} are needed): "
+            "their clocks differ, or the record is too short"
+        )
+
+
 def fitted_record(record: StampedRecord, valve: Valve) -> FittedRecord:
     """Smooth the pressure on a uniform grid, and leave the stem at its own stamps.
 
@@ -301,11 +315,7 @@ def fitted_record(record: StampedRecord, valve: Valve) -> FittedRecord:
     begin = max(sampled.time[0], measured.time[0])
     end = min(sampled.time[-1], measured.time[-1])
     inside = (measured.time >= begin) & (measured.time <= end)
-    if np.count_nonzero(inside) < _FEWEST:
-        raise RefusalError(
-            f"the two signals overlap in only {np.count_nonzero(inside)} positions (at least "
-            f"{_FEWEST} are needed): their clocks differ, or the record is too short"
-        )
+    _require_enough(measured.time.size, np.count_nonzero(inside))
     stem = StampedSignal(measured.time[inside] - begin, measured.value[inside])
     drive = StampedSignal(sampled.time - begin, sampled.value)
     finest = min(stem.period, drive.period)

@@ -36,10 +36,14 @@ _STATED, _OF_RECORD = 3.0, 0.1
 """Largest lag that is possible, s. Where a larger timing uncertainty is stated, the largest lag in
 deviations of it, and at most as a share of the record."""
 
+SLOW_SAMPLING = LARGEST_LAG
+"""Sampling period, s, above which a lag of one sample is larger than any usual lag."""
+
 _STEP, _MOST_STEPS = 1e-3, 1500
+"""Step between the lags, s, and about the largest number of steps in each direction."""
+
 _WORKS, _EVERY = 150, 10
-"""Step between the lags, s, and the most steps in each direction; and the most lags at which the
-work of the force is computed, of which it takes every tenth at most."""
+"""The work of the force is computed at every tenth lag, and at about so many at most."""
 
 USUAL_LAG = 4e-3
 """Scale, s, of the prior of the lag where no timing is stated, a Cauchy distribution.
@@ -94,13 +98,18 @@ class LagPrior:
     @cached_property
     def lags(self) -> _Array:
         """Lags that are possible, s."""
-        count = min(round(self.reach / _STEP), _MOST_STEPS)
+        count = math.ceil(min(round(self.reach / _STEP), _MOST_STEPS) / self._every) * self._every
         return np.linspace(-self.reach, self.reach, 2 * count + 1, dtype=np.float64)
 
     @cached_property
     def work_lags(self) -> _Array:
         """Lags, s, at which the work of the force is computed."""
-        return self.lags[:: max(self.lags.size // _WORKS, _EVERY)]
+        return self.lags[:: self._every]
+
+    @property
+    def _every(self) -> int:
+        """Ratio of the steps of `work_lags` and `lags`, which divides the lags on either side."""
+        return max(2 * min(round(self.reach / _STEP), _MOST_STEPS) // _WORKS, _EVERY)
 
     @property
     def is_known(self) -> bool:

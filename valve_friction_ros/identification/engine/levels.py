@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from valve_friction_ros.identification.engine.departures import by_least_magnitudes
 from valve_friction_ros.identification.engine.friction_curve import FrictionCurve
 from valve_friction_ros.identification.engine.intervals import Estimated
-from valve_friction_ros.identification.engine.lags import LARGEST_LAG
+from valve_friction_ros.identification.engine.lags import SLOW_SAMPLING
 from valve_friction_ros.identification.engine.sliding_averages import (
     MeasuredSignal,
     away_from_stops,
@@ -45,28 +45,44 @@ _Array = NDArray[np.float64]
 _LEAST_TIME, _LEAST_SAMPLES = 10.0, 4
 """Time, s, and samples in which force and stem are still at a level."""
 
-_NOISE, _OF_STEM, _OF_FORCE = 4.0, 4e-3, 0.01
-"""Range of a signal that is still, in deviations of its noise and as a share of its whole range."""
+_OF_STEM, _OF_FORCE = 4e-3, 0.01
+"""Range of a signal that is still, as a share of its whole range; at least that of its noise."""
 
-_APART, _BEYOND = 0.02, 2.0
-"""Distance between two levels, as a share of the stem's range; and the most by which the force goes
-beyond a level on the way to it, in ranges of a still force."""
+_APART = 0.02
+"""Distance between two levels, as a share of the stem's range."""
 
-_CREEP = 0.1
-"""Share of the friction by which the force may change in the first half of a rest: a force that
-creeps on holds the stem by less than its friction."""
+_CREEP = 0.05
+"""Share of the friction by which the force may go beyond a level on the way to it, or change in the
+first half of the rest: a force that goes back holds the stem by less than its friction."""
 
-_UNSEEN = 0.15
+_GAP = 10.0
+"""Periods without a sample after which a stem may have come from anywhere."""
+
+_HIDDEN = 0.15
 """Half width due to what a still signal hides, over its range: the dead band of a historian or the
 step of a converter shifts all levels that are reached from one side alike."""
 
-_FEWEST, _OUTLIER, _CLEARLY = 3, 4.0, 3.0
-"""Levels that are needed in each direction; deviations beyond which a level is left out; and the
-least slope of the lines, in its deviations: without a spring, any force holds a stem anywhere."""
+_FEWEST, _MANY = 3, 12
+_OUTLIER, _CLEARLY = 4.0, 3.0
+"""Levels that are needed in each direction, and in all before one may be left out; deviations
+beyond which it is; and the least slope of the lines, in its deviations: without a spring, any force
+holds a stem anywhere."""
 
 _AT_REST, _LARGEST_HALF_WIDTH = 0.06, 0.5
 """Half width over the value by which friction near rest may differ from that at the mean speed; and
 the largest half width at which the levels say anything."""
+
+
+class _Levels(NamedTuple):
+    """Levels, and the ranges of a `force`, N, and a `stem`, m, that are still.
+
+    Each has one of the `rows`: the side from which the stem came, its position, the force, and the
+    mean speed of the move before, m/s.
+    """
+
+    rows: _Array
+    force: float
+    stem: float
 
 
 def curve_of_levels(record: StampedRecord, valve: Valve) -> FrictionCurve | None:
@@ -77,66 +93,62 @@ def curve_of_levels(record: StampedRecord, valve: Valve) -> FrictionCurve | None
     """
     force, stem = force_and_stem(record, valve)
     step = max(force.period, stem.period)
-    if step <= LARGEST_LAG:
+    if step <= SLOW_SAMPLING:
         return None
-    levels = _levels(force, stem, step)
-    levels = levels.but(~away_from_stops(levels.rows[:, 1], valve))
-    found = _curve(levels.creeping_by(2.0 * levels.force), step)
+    found = _curve(_levels(force, stem, valve, step), step)
     if found is None:
         return None
-    creep = max(_CREEP * found.numbers[SLIDING].value, 2.0 * levels.force)
-    return _curve(levels.creeping_by(creep), step)
+    creep = _CREEP * found.numbers[SLIDING].value
+    return _curve(_levels(force, stem, valve, step, creep), step)
 
 
-class _Levels(NamedTuple):
-    """Levels, and the ranges of a `force`, N, and a `stem`, m, that are still.
-
-    Each has one of the `rows`: the side from which the stem came, its position, the force, the
-    range of the force in the first half of the rest, and the mean speed of the move before, m/s.
-    """
-
-    rows: _Array
-    force: float
-    stem: float
-
-    def but(self, which: NDArray[np.bool_]) -> "_Levels":
-        """Leave some levels out."""
-        return self._replace(rows=self.rows[~which])
-
-    def creeping_by(self, most: float) -> "_Levels":
-        """Keep the levels whose force changes by no more than `most`, N."""
-        return self.but(self.rows[:, 3] > most)
-
-
-def _levels(force: MeasuredSignal, stem: MeasuredSignal, step: float) -> _Levels:
+def _levels(
+    force: MeasuredSignal,
+    stem: MeasuredSignal,
+    valve: Valve,
+    step: float,
+    creep: float = math.inf,
+) -> _Levels:
+    """Return the levels whose force creeps by no more than a limit, N, beside its noise."""
     time = np.arange(max(force.time[0], stem.time[0]), min(force.time[-1], stem.time[-1]), step)
     length = max(math.ceil(_LEAST_TIME / step), _LEAST_SAMPLES)
     if time.size < 2 * length:
-        return _Levels(np.empty((0, 5)), 0.0, 0.0)
-    pressed, position = (np.interp(time, one.time, one.value) for one in (force, stem))
-    range_ = float(np.ptp(position))
-    creep = max(_OF_FORCE * float(np.ptp(pressed)), _NOISE * force.noise)
-    resting = max(_OF_STEM * range_, _NOISE * stem.noise)
-    rests = _range_ahead(position, length) <= resting
-    still = rests & (_range_ahead(pressed, length) <= creep)
+        return _Levels(np.empty((0, 4)), 0.0, 0.0)
+    pressed, position = (_between_gaps(one, time) for one in (force, stem))
+    # The usual range of so many samples of normal noise of unit deviation, and one more.
+    of_noise = 2.0 * math.sqrt(2.0 * math.log(length)) + 1.0
+    ranges = [float(np.nanmax(one) - np.nanmin(one)) for one in (pressed, position)]
+    still_force = max(min(_OF_FORCE * ranges[0], creep), of_noise * force.noise)
+    still_stem = max(_OF_STEM * ranges[1], of_noise * stem.noise)
+    most = max(min(2.0 * still_force, creep), of_noise * force.noise)
+    rests = _range_ahead(position, length) <= still_stem
+    still = rests & (_range_ahead(pressed, length) <= still_force)
     rows: list[tuple[float, ...]] = []
     last, since = math.nan, 0
     for begin, end in runs_of(rests):
         place = float(np.mean(position[begin : begin + length]))
-        if abs(place - last) <= _APART * range_:
-            since = end
-            continue
-        side, moved, last = float(np.sign(place - last)), abs(place - last), place
-        first = begin + int(np.argmax(still[begin:end]))
-        level = float(np.mean(pressed[first : first + length]))
-        beyond = float(np.max(side * (pressed[since : first + 1] - level)))
-        half = pressed[first : max((begin + end) // 2, first) + length]
-        together = bool(still[first]) and first - begin <= length
-        if math.isfinite(side) and together and beyond <= _BEYOND * creep:
-            speed = moved / (max(begin - since, 1) * step)
-            rows.append((side, place, level, float(np.ptp(half)), speed))
+        if not abs(place - last) <= _APART * ranges[1]:
+            side, moved, last = float(np.sign(place - last)), abs(place - last), place
+            first = begin + int(np.argmax(still[begin:end]))
+            level = float(np.mean(pressed[first : first + length]))
+            beyond = float(np.max(side * (pressed[since : first + 1] - level)))
+            half = pressed[first : max((begin + end) // 2, first) + length]
+            together = still[first] and first - begin <= length
+            if together and max(beyond, float(np.ptp(half))) <= most:
+                speed = moved / (max(begin - since - length + 1, 1) * step)
+                rows.append((side, place, level, speed))
         since = end
-    return _Levels(np.array(rows).reshape(-1, 5), creep, resting)
+    found = np.array(rows).reshape(-1, 4)
+    return _Levels(found[away_from_stops(found[:, 1], valve)], still_force, still_stem)
+
+
+def _between_gaps(signal: MeasuredSignal, time: _Array) -> _Array:
+    """Return a signal at some times; nan in its gaps, which one that is sent on change has not."""
+    values = np.interp(time, signal.time, signal.value)
+    if not signal.is_sent_on_change:
+        after = np.clip(np.searchsorted(signal.time, time), 1, signal.time.size - 1)
+        values[np.diff(signal.time)[after - 1] > _GAP * signal.period] = math.nan
+    return values
 
 
 def _range_ahead(signal: _Array, length: int) -> _Array:
@@ -149,25 +161,26 @@ def _range_ahead(signal: _Array, length: int) -> _Array:
 
 def _curve(levels: _Levels, step: float) -> FrictionCurve | None:
     """Fit a line over the position to the forces of some levels, shifted by the friction."""
-    side, place, force, _, speed = levels.rows.T
+    side, place, force, speed = levels.rows.T
+    if side.size >= _MANY:
+        columns = np.column_stack([side, place - np.mean(place), np.ones_like(place)])
+        left = np.abs(force - columns @ by_least_magnitudes(columns, force))
+        deviation = max(float(np.median(left)) / MEDIAN_MAGNITUDE, _HIDDEN * levels.force)
+        side, place, force, speed = levels.rows[left <= _OUTLIER * deviation].T
     ups = int(np.count_nonzero(side > 0))
-    if min(ups, side.size - ups) < _FEWEST or not np.ptp(place) > 0.0:
+    if min(ups, side.size - ups) < _FEWEST:
         return None
     columns = np.column_stack([side, place - np.mean(place), np.ones_like(place)])
-    left = np.abs(force - columns @ by_least_magnitudes(columns, force))
-    deviation = max(float(np.median(left)) / MEDIAN_MAGNITUDE, _UNSEEN * levels.force)
-    usual = left <= _OUTLIER * deviation
-    columns, force, side, speed = columns[usual], force[usual], side[usual], speed[usual]
     freedom = force.size - columns.shape[1]
-    if freedom < 1 or np.linalg.matrix_rank(columns) < columns.shape[1]:
+    if np.linalg.matrix_rank(columns) < columns.shape[1]:
         return None
     inverse = np.linalg.inv(columns.T @ columns)
     friction, slope, _ = estimate = inverse @ (columns.T @ force)
     left = force - columns @ estimate
     scatter = math.sqrt(float(left @ left) / freedom)
     of_levels = half_width(scatter * math.sqrt(float(inverse[0, 0])), freedom)
-    unseen = _UNSEEN * math.hypot(levels.force, float(slope) * levels.stem)
-    of_record = math.hypot(of_levels, unseen)
+    hidden = _HIDDEN * math.hypot(levels.force, float(slope) * levels.stem)
+    of_record = math.hypot(of_levels, hidden)
     width = math.hypot(of_record, _AT_REST * abs(float(friction)))
     of_slope = scatter * math.sqrt(float(inverse[1, 1]))
     if slope <= _CLEARLY * of_slope or not width <= _LARGEST_HALF_WIDTH * friction:

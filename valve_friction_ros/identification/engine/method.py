@@ -84,7 +84,7 @@ from valve_friction_ros.identification.trust.verdict import (
 )
 from valve_friction_ros.model.recording import Recording, StampedRecord, StampedSignal
 from valve_friction_ros.model.valve import KarnoppParameters, Valve
-from valve_friction_ros.signals import MeasuredRecord, as_sent_on_change, measured
+from valve_friction_ros.signals import MeasuredRecord, as_sent_on_change, measured, without_repeats
 from valve_friction_ros.wording import two_digits
 
 _WINDOWS, _SHORTEST_WINDOW = 10, 3
@@ -163,9 +163,10 @@ def _identified(
     record = part.record
     lag = lag_prior_of(settings, profile, record)
     curves = friction_curves(record, valve, lag, known_of(settings))
-    levels = curve_of_levels(stamped, valve)
+    has_spring = settings.fixed.get("spring_constant") != 0.0
+    levels = curve_of_levels(stamped, valve) if has_spring else None
     balanced, departed = curve_numbers(curves), None
-    if settings.fixed.get("spring_constant") != 0.0:
+    if has_spring:
         departed = static_friction(record, valve, balanced, lag)
     static = math.nan if departed is None else departed.static_friction.value
     try:
@@ -178,8 +179,7 @@ def _identified(
             curves, balanced = [levels], dict(levels.numbers)
         force = float(np.ptp(valve.force_per_drive * record.drive.value))
         outcome = _of_force_balance(curves, balanced, settings, str(refusal), force)
-    by_sample = curves[0].by_sample if curves and lag.deviation is None else 0.0
-    outcome = _as_sampled(_with_departures(outcome, departed), record, by_sample, levels)
+    outcome = _as_sampled(_with_departures(outcome, departed), record, lag, curves, levels)
     published, beside = published_beside(uniform, valve, settings)
     misfit = outcome.misfit
     return Result(
@@ -357,38 +357,53 @@ def _with_departures(outcome: _Outcome, departed: Departed | None) -> _Outcome:
 
 
 def _as_sampled(
-    outcome: _Outcome, record: StampedRecord, by_sample: float, levels: FrictionCurve | None
+    outcome: _Outcome,
+    record: StampedRecord,
+    lag: LagPrior,
+    curves: Sequence[FrictionCurve],
+    levels: FrictionCurve | None,
 ) -> _Outcome:
     """Doubt the friction that a lag of one sample would move, and compare it with the levels.
 
     No lag affects the levels. Where the sliding friction agrees with theirs, the narrower interval
-    holds; that of the moves includes the difference where a lag of one sample matters (`by_sample`,
-    N). Where it does not agree, the levels are more probable, and the interval includes both.
+    holds; that of the moves includes the difference where a lag of one sample matters. Where it
+    does not agree, the levels are more probable, and the interval includes both. If there certainly
+    is no lag, the moves need no check.
     """
-    interval = max(record.drive.period, record.position.period)
+    by_sample = curves[0].by_sample if curves and lag.deviation is None else 0.0
+    interval = max(without_repeats(one).period for one in (record.drive, record.position))
     doubted = verdicts.doubted_by_sampling(outcome.parameters, by_sample, interval)
     if levels is None:
         return outcome._replace(parameters=doubted)
     level, reason = levels.numbers[SLIDING], verdicts.BY_LEVELS
+    shown = (
+        f"the levels at which force and stem rest show a sliding friction of {level.value:.3g} ± "
+        f"{two_digits(level.half_width)} N"
+    )
     known = outcome.numbers.get(SLIDING)
+    if lag.is_known and known is not level:
+        return outcome
     if known is not None and known is not level and known.value > 0:
         apart = abs(known.value - level.value)
         if apart <= math.hypot(known.half_width, level.half_width):
             if abs(by_sample) > known.half_width:
                 of_levels = math.hypot(apart, NORMAL_QUANTILE * level.record)
                 known = replace(known, half_width=math.hypot(known.half_width, of_levels))
+            reason = ""
             if known.half_width <= level.half_width:
                 level = known
-            reason = "" if outcome.misfit.describes else outcome.parameters[SLIDING].reason
+                reason = "" if outcome.misfit.describes else outcome.parameters[SLIDING].reason
         else:
             level = replace(level, half_width=max(level.half_width, apart))
             reason = verdicts.unlike_levels(known.value)
+            doubted = verdicts.weakened(doubted, reason)
     return outcome._replace(
         parameters={
             **doubted,
             SLIDING: verdicts.judged(SLIDING, level, level.half_width, reason),
         },
         numbers={**outcome.numbers, SLIDING: level},
+        findings=(*outcome.findings, shown),
     )
 
 

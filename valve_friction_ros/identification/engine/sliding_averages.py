@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from valve_friction_ros.identification.engine.lags import LARGEST_LAG, LagPrior
+from valve_friction_ros.identification.engine.lags import SLOW_SAMPLING, LagPrior
 from valve_friction_ros.identification.trust.uncertainty import MEDIAN_MAGNITUDE
 from valve_friction_ros.model.recording import StampedRecord, StampedSignal
 from valve_friction_ros.model.valve import Valve
@@ -151,14 +151,19 @@ class MeasuredSignal(NamedTuple):
         noise = abs(scale) * stamped_noise(fresh)
         return cls(fresh.time, scale * fresh.value - zero, noise, fresh.period)
 
+    @property
+    def is_sent_on_change(self) -> bool:
+        """Whether it is sent on change, so that its pauses are no gaps."""
+        pauses = np.diff(self.time)
+        return float(np.quantile(pauses, 1.0 - _FEW_PAUSES)) > _PAUSE * self.period
+
     def halves(self, grid: _Array) -> list[_Array]:
         """Return even and odd samples on a grid, averaged where it is coarser than they are.
 
         A signal that is sent on change needs each sample: both halves are then the whole signal.
         """
         length = int((grid[1] - grid[0]) / self.period)
-        pauses = np.diff(self.time)
-        if float(np.quantile(pauses, 1.0 - _FEW_PAUSES)) > _PAUSE * self.period:
+        if self.is_sent_on_change:
             return [np.interp(grid, self.time, self.value)] * 2
         parts = [(self.time[part::2], self.value[part::2]) for part in (0, 1)]
         return [np.interp(grid, time, averaged_twice(value, length)) for time, value in parts]
@@ -493,7 +498,7 @@ def larger_change(late_by: Callable[[float], float], period: float) -> float:
 
     It is 0 where usual lags include that.
     """
-    if period <= LARGEST_LAG:
+    if period <= SLOW_SAMPLING:
         return 0.0
     return max((late_by(lag) - late_by(0.0) for lag in (period, -period)), key=abs)
 

@@ -418,6 +418,11 @@ def doubted_by_sampling(
         f"one signal recorded a sample ({interval:.2g} s) late would change the sliding friction "
         f"by {abs(change):.3g} N; set timing_uncertainty, 0 if both signals are sampled together"
     )
+    return weakened(parameters, reason)
+
+
+def weakened(parameters: Mapping[str, Parameter], reason: str) -> dict[str, Parameter]:
+    """Return the verdicts, with each identified friction weak for a reason."""
     return {
         name: replace(one, verdict=Verdict.WEAK, reason=reason)
         if name in (SLIDING, *_BY_SPEED) and one.verdict is Verdict.IDENTIFIED

@@ -221,6 +221,8 @@ class AlarmBoard:
         values = {name: self._node.get_parameter(name).value for name in _ASKED}
         kind = None if values["alarm_kind"] == "all" else AlarmKind(values["alarm_kind"])
         self._forget()
+        if not values["alarm_who"].strip():
+            raise RefusalError("the parameter alarm_who is empty: set it to your name")
         try:
             request = AlarmRequest(
                 action, values["alarm_who"], values["alarm_text"], 3600 * values["alarm_hours"]
