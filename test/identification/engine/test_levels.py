@@ -15,9 +15,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from valve_friction_ros.identification import RefusalError, Verdict, identify
+from valve_friction_ros.identification import Parameter, RefusalError, Verdict, identify
 from valve_friction_ros.identification.engine.fitted_record import fitted_record
 from valve_friction_ros.identification.engine.levels import curve_of_levels
+from valve_friction_ros.identification.engine.verdicts import doubted_by_sampling
 from valve_friction_ros.identification.settings import SLIDING, IdentificationSettings
 from valve_friction_ros.model import Drive, Recording, Valve
 from valve_friction_ros.model.recording import StampedRecord, StampedSignal
@@ -203,6 +204,31 @@ class TestLagOfASample:
         assert found.verdict is Verdict.WEAK
         assert "recorded a sample (1 s) late would change the sliding friction by" in found.reason
         assert abs(found.value - FRICTION) < found.half_width
+
+    @pytest.mark.parametrize(
+        ("verdict", "half_width", "change", "reason"),
+        [
+            (Verdict.IDENTIFIED, 5.0, 5.0, ""),
+            (Verdict.IDENTIFIED, 5.0, -6.0, "one signal recorded a sample (1 s) late"),
+            (Verdict.WEAK, 5.0, 6.0, "noise; one signal recorded a sample (1 s) late"),
+            (Verdict.NOT_IDENTIFIABLE, math.nan, 0.0, ""),
+        ],
+    )
+    def test_doubt(self, verdict, half_width, change, reason):
+        """Of a number that is known better than the change; F_c then shares it."""
+        before = "noise" if verdict is Verdict.WEAK else ""
+        sliding = Parameter(SLIDING, 100.0, half_width / 2, half_width, verdict, before)
+        coulomb = Parameter("coulomb_friction", 90.0, 2.0, 4.0, Verdict.IDENTIFIED)
+        spring = Parameter("spring_constant", 3e4, 10.0, 20.0, Verdict.IDENTIFIED)
+        given = {one.name: one for one in (sliding, coulomb, spring)}
+        found = doubted_by_sampling(given, change, 1.0)
+        assert found["spring_constant"] is spring
+        if not reason:
+            assert found == given
+            return
+        assert found[SLIDING].verdict is found["coulomb_friction"].verdict is Verdict.WEAK
+        assert found[SLIDING].reason.startswith(reason)
+        assert f"by {abs(change):g} N" in found["coulomb_friction"].reason
 
     def test_stated_as_synchronous(self):
         settings = IdentificationSettings(timing_uncertainty=0.0)

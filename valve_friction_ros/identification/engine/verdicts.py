@@ -412,13 +412,15 @@ def doubted_by_sampling(
     makes a `change`, N, of the sliding friction.
     """
     sliding = parameters[SLIDING]
-    if abs(change) <= sliding.half_width:
+    if not abs(change) > sliding.half_width:
         return dict(parameters)
     reason = (
         f"one signal recorded a sample ({interval:.2g} s) late would change the sliding friction "
         f"by {abs(change):.3g} N; set timing_uncertainty, 0 if both signals are sampled together"
     )
-    return weakened(parameters, reason)
+    if sliding.verdict is Verdict.WEAK:
+        sliding = replace(sliding, reason=f"{sliding.reason}; {reason}")
+    return weakened({**parameters, SLIDING: sliding}, reason)
 
 
 def weakened(parameters: Mapping[str, Parameter], reason: str) -> dict[str, Parameter]:
