@@ -159,7 +159,7 @@ def _recorded(
             lambda gap: (
                 f"row {by_name[gap.name].rows[gap.sample]}, column "
                 f"{table.clock_of(by_name[gap.name].signal)!r}: gap of "
-                f"{gap.seconds:.3g} s: use a stretch of the record without it"
+                f"{gap.seconds:.3g} s: {gap.remedy('use a stretch of the record without it')}"
             ),
         )
     except RefusalError as refusal:

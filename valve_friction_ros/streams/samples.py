@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from valve_friction_ros.identification.refusal import LittleMotionError, RefusalError
 from valve_friction_ros.model.drive import Drive
 from valve_friction_ros.model.recording import Recording, StampedRecord, StampedSignal
+from valve_friction_ros.wording import percentage
 
 DAY = 86_400_000_000_000
 """A day, ns."""
@@ -366,9 +367,9 @@ Chosen: at 1 kHz that is 1 µs, in which a stem at 0.1 m/s moves by 0.1 µm, bel
 class Gap:
     """The longest gap of signal `name`: `seconds` before `sample`, `since_start` s after the first.
 
-    All gaps together take the `share` of the time of the signal. `bunches` is the number of bunches
-    that the samples come in, with gaps of about one length between them; else 0. The text of a gap
-    is a refusal with its remedy.
+    All gaps, `count` of them, take the `share` of the time of the signal. `bunches` is the number
+    of bunches that the samples come in, with gaps of about one length between them; else 0. The
+    text of a gap is a refusal with its remedy.
     """
 
     name: str
@@ -376,6 +377,7 @@ class Gap:
     seconds: float
     since_start: float
     share: float
+    count: int = 1
     bunches: int = 0
 
     @property
@@ -386,15 +388,30 @@ class Gap:
             "first sample"
         )
 
+    @property
+    def is_most(self) -> bool:
+        """Whether gaps take most of the time, so that no method uses the record."""
+        return self.share > _MOST_MISSING
+
+    def remedy(self, usual: str) -> str:
+        """Return what to do: as `usual`, unless many gaps take most of the time."""
+        if not self.is_most or self.count < _FEWEST_BUNCHES:
+            return usual
+        return (
+            f"{self.count} gaps take {percentage(self.share)} of its time; record it at a fixed "
+            "rate, or export it without compression"
+        )
+
     def __str__(self) -> str:
         """Return the refusal."""
-        if self.bunches and self.share > _MOST_MISSING:
+        if self.bunches and self.is_most:
             return (
                 f"the time stamps of {self.name} come in {self.bunches} bunches, "
                 f"{self.seconds:.3g} s apart: stamp each sample with the time of its measurement, "
                 "not of its arrival"
             )
-        return f"{self.what}: use a record without a gap, or clear the buffer and record again"
+        usual = "use a record without a gap, or clear the buffer and record again"
+        return f"{self.what}: {self.remedy(usual)}"
 
 
 def _silences(samples: Samples) -> NDArray[np.bool_]:
@@ -429,6 +446,7 @@ def _gap(name: str, samples: Samples, period: int) -> Gap | None:
         float(gaps.max()) / 1e9,
         since_start,
         float(np.sum(gaps)) / whole,
+        gaps.size,
         gaps.size + 1 if is_regular else 0,
     )
 
@@ -485,7 +503,7 @@ def uniform_recording(
     period = _period(names[1], position)
     either = _gap(names[0], drive, period_of_drive), _gap(names[1], position, period)
     gaps = [gap for gap in either if gap is not None]
-    if gaps and (most := max(gaps, key=lambda gap: gap.share)).share > _MOST_MISSING:
+    if gaps and (most := max(gaps, key=lambda gap: gap.share)).is_most:
         raise RefusalError(refusal_of(most))
     begin = max(drive.stamps[0], position.stamps[0])
     end = min(drive.stamps[-1], position.stamps[-1])

@@ -407,7 +407,9 @@ class ValveFeed:
             snapshot.pressure,
             snapshot.position,
             names,
-            refusal_of=lambda gap: f"{gap.what}: use a stretch of the record without it",
+            refusal_of=lambda gap: (
+                f"{gap.what}: {gap.remedy('use a stretch of the record without it')}"
+            ),
         )
 
 
