@@ -14,7 +14,6 @@
 ``identifier:=false`` starts the valve alone.
 """
 
-import re
 from pathlib import Path
 
 from launch import LaunchContext, LaunchDescription
@@ -24,10 +23,9 @@ from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.substitutions import FindPackageShare
 
-from valve_friction_ros.outside_text import nearest, resembling
+from valve_friction_ros.outside_text import nearest, require_namespace, resembling
 
 PACKAGE = "valve_friction_ros"
-NAMESPACE = re.compile(r"/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
 YES_OR_NO = ["true", "false", "True", "False"]
 ARGUMENTS = {
     "valve": ("fv_101", "Namespace of the valve: letters, digits and underscores.", None),
@@ -53,11 +51,7 @@ def nodes(context: LaunchContext) -> list[Node]:
     """Make the nodes, with one parameter file; the tag of fv_101 is FV-101 unless that says so."""
     require_known(context)
     valve = LaunchConfiguration("valve").perform(context)
-    if not NAMESPACE.fullmatch(valve):
-        raise ValueError(
-            f"valve '{valve}' is not a ROS namespace: use letters, digits and underscores, as in "
-            "valve:=fv_101"
-        )
+    require_namespace(valve, "valve:=fv_101")
     tag = {"valve_tag": valve.rpartition("/")[2].upper().replace("_", "-")}
     names = ["pressure_source", "simulator"]
     if LaunchConfiguration("identifier").perform(context).lower() == "true":

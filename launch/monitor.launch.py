@@ -32,10 +32,9 @@ from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.substitutions import FindPackageShare
 
-from valve_friction_ros.outside_text import nearest, resembling
+from valve_friction_ros.outside_text import NAMESPACE, nearest, require_namespace, resembling
 
 PACKAGE = "valve_friction_ros"
-NAMESPACE = re.compile(r"/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
 TOPIC = re.compile("~?" + NAMESPACE.pattern, re.ASCII)
 INPUTS = {"pressure_topic": "actuator_pressure", "stem_topic": "stem_state"}
 """Arguments, and keys of a file of valves, with the name that each remaps."""
@@ -85,11 +84,7 @@ def plant_valves(text: str, usual: dict[str, str]) -> list[PlantValve]:
     """Read the valves; ``{valve}`` in a topic stands for the valve's name."""
     valves: dict[str, PlantValve] = {}
     for name, given in listed(text):
-        if not NAMESPACE.fullmatch(name):
-            raise ValueError(
-                f"valve '{name}' is not a ROS namespace: use letters, digits and underscores, as "
-                "in valves:=fv_101,fv_102"
-            )
+        require_namespace(name, "valves:=fv_101,fv_102")
         if not isinstance(given, dict) or (unknown := sorted(map(str, set(given) - set(INPUTS)))):
             what = f"the unknown key '{unknown[0]}'" if isinstance(given, dict) else f"'{given}'"
             raise ValueError(

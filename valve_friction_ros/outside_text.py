@@ -13,6 +13,7 @@ import csv
 import difflib
 import io
 import ipaddress
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -70,6 +71,25 @@ def page_environment(package: str) -> "Environment":
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
+
+
+NAMESPACE = re.compile(r"/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
+"""Namespace of a valve on the ROS graph, relative or absolute."""
+
+
+def require_namespace(valve: str, argument: str) -> None:
+    """Refuse the name of a valve that is no namespace; `argument` shows how to give one.
+
+    Raises
+    ------
+    ValueError
+        If the name cannot be a namespace.
+    """
+    if not NAMESPACE.fullmatch(valve):
+        raise ValueError(
+            f"valve '{valve}' is not a ROS namespace: use letters, digits and underscores, as in "
+            f"{argument}"
+        )
 
 
 def is_loopback(host: str) -> bool:

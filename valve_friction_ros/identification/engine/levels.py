@@ -159,18 +159,23 @@ def _range_ahead(signal: _Array, length: int) -> _Array:
     return found
 
 
+def _columns(side: _Array, place: _Array) -> _Array:
+    """Return the columns of friction, slope and middle force of the lines."""
+    return np.column_stack([side, place - np.mean(place), np.ones_like(place)])
+
+
 def _curve(levels: _Levels, step: float) -> FrictionCurve | None:
     """Fit a line over the position to the forces of some levels, shifted by the friction."""
     side, place, force, speed = levels.rows.T
     if side.size >= _MANY:
-        columns = np.column_stack([side, place - np.mean(place), np.ones_like(place)])
+        columns = _columns(side, place)
         left = np.abs(force - columns @ by_least_magnitudes(columns, force))
         deviation = max(float(np.median(left)) / MEDIAN_MAGNITUDE, _HIDDEN * levels.force)
         side, place, force, speed = levels.rows[left <= _OUTLIER * deviation].T
     ups = int(np.count_nonzero(side > 0))
     if min(ups, side.size - ups) < _FEWEST:
         return None
-    columns = np.column_stack([side, place - np.mean(place), np.ones_like(place)])
+    columns = _columns(side, place)
     freedom = force.size - columns.shape[1]
     if np.linalg.matrix_rank(columns) < columns.shape[1]:
         return None

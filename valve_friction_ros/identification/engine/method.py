@@ -373,16 +373,14 @@ def _as_sampled(
     by_sample = curves[0].by_sample if curves and lag.deviation is None else 0.0
     interval = max(without_repeats(one).period for one in (record.drive, record.position))
     doubted = verdicts.doubted_by_sampling(outcome.parameters, by_sample, interval)
-    if levels is None:
+    known = outcome.numbers.get(SLIDING)
+    if levels is None or (lag.is_known and known is not levels.numbers[SLIDING]):
         return outcome._replace(parameters=doubted)
     level, reason = levels.numbers[SLIDING], verdicts.BY_LEVELS
     shown = (
         f"the levels at which force and stem rest show a sliding friction of {level.value:.3g} ± "
         f"{two_digits(level.half_width)} N"
     )
-    known = outcome.numbers.get(SLIDING)
-    if lag.is_known and known is not level:
-        return outcome
     if known is not None and known is not level and known.value > 0:
         apart = abs(known.value - level.value)
         if apart <= math.hypot(known.half_width, level.half_width):

@@ -500,7 +500,8 @@ def larger_change(late_by: Callable[[float], float], period: float) -> float:
     """
     if period <= SLOW_SAMPLING:
         return 0.0
-    return max((late_by(lag) - late_by(0.0) for lag in (period, -period)), key=abs)
+    here = late_by(0.0)
+    return max((late_by(lag) - here for lag in (period, -period)), key=abs)
 
 
 def work_of_rounding(force: MeasuredSignal, time: _Array, along: _Array) -> float:

@@ -24,7 +24,6 @@ from valve_friction_ros.identification.engine.intervals import (
     ROUNDING,
     Estimated,
 )
-from valve_friction_ros.identification.engine.lags import LARGEST_LAG
 from valve_friction_ros.identification.engine.posterior_fit import PosteriorFit
 from valve_friction_ros.identification.settings import SLIDING, UNITS, IdentificationSettings
 from valve_friction_ros.identification.trust.uncertainty import NORMAL_QUANTILE
@@ -324,8 +323,8 @@ def fit_verdicts(
     numbers: Mapping[str, Estimated],
     settings: IdentificationSettings,
     misfit: Misfit,
-    profile: Profile = Profile.PLANT,
-    reach: float = LARGEST_LAG,
+    profile: Profile,
+    reach: float,
 ) -> dict[str, Parameter]:
     """Return every reported number of the first fit with its verdict.
 
