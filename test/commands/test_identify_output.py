@@ -296,7 +296,7 @@ class TestOptions:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda c: c.update({k: v[:309] for k, v in c.items()}), "the record is too short: 309 s"),
+        (lambda c: c.update({k: v[:29] for k, v in c.items()}), "the record is too short: 29 sa"),
         (lambda c: c["position_m"].fill(0.01), "the stem did not move: its position spans 0 µm"),
         (lambda c: c["position_m"].put(range(50, 150), math.nan), "row 52, column 'position_m': "),
         (lambda c: c["time_s"].put(50, 0.48), "row 52, column 'time_s' goes back (0.48 s after 0"),
@@ -337,7 +337,10 @@ def test_no_valve_file_for_a_pressure(refusal, quick_csv):
         ("--fix mass=nan", "mass must be finite, got nan"),
         ("--fix static_friction=150", "FILE: the method plant finds F_s itself"),
         ("--derivative-window 30", "derivative_window must be odd and at least order + 2 = 5"),
-        ("--derivative-window 101", "FILE: the record is too short: 1000 samples"),
+        (
+            "--method published --derivative-window 101",
+            "FILE: the record is too short: 1000 samples",
+        ),
         ("--position-bias nan", "position_bias must be finite, got nan"),
         ("--timing-uncertainty=-0.01", "timing_uncertainty must"),
         ("--area-uncertainty=nan", "area_uncertainty must"),

@@ -34,6 +34,8 @@ from valve_friction_ros.model import (
     LOW_FRICTION,
     Drive,
     Recording,
+    SensorNoise,
+    SineWave,
     SquareWave,
     Valve,
     converter_response,
@@ -98,6 +100,24 @@ def test_stamps_do_not_matter(jitter, lost):
     friction = result.parameters["coulomb_friction"]
     assert friction.verdict is Verdict.IDENTIFIED
     assert friction.half_width < 0.01 * friction.value
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("rate", [3, 5])
+def test_few_samples_of_slow_moves_are_enough(rate, seed):
+    """A minute at a few hertz from a logger: fewer samples than the published method needs."""
+    generator = np.random.default_rng([rate, seed])
+    period, size = generator.uniform(15.0, 30.0), generator.uniform(0.5, 1.0)
+    time = np.arange(60_000) / 1000
+    wave = SineWave(period=period).sample(time)
+    pressure = np.mean(wave) + size * (wave - np.mean(wave))
+    motion = simulate(BENCH_VALVE, HIGH_FRICTION, pressure, 1e-3)
+    rows = np.searchsorted(time, np.arange(60 * rate) / rate)
+    record = Recording(1 / rate, pressure[rows], motion.position[rows])
+    found = identify_plant(SensorNoise(2e-5, 150.0, seed).applied_to(record), BENCH_VALVE)
+    truth = mean_sliding_friction(HIGH_FRICTION, motion.velocity)
+    assert_held(found.parameters, {"sliding_friction": truth})
+    assert found.parameters["sliding_friction"].half_width < 0.05 * truth
 
 
 @pytest.mark.parametrize("late", [-0.02, 0.02])

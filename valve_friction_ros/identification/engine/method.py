@@ -89,7 +89,7 @@ from valve_friction_ros.wording import two_digits
 
 _WINDOWS, _SHORTEST_WINDOW = 10, 3
 """Means of the position in which a record must show both directions, and fewest samples in each:
-sensors that send on change leave few."""
+sensors that send on change and historians leave few."""
 
 _SAME_SPEED = 0.1
 """Share by which the simulated and the measured stem may differ in their mean speeds: measured
@@ -157,7 +157,7 @@ def _identified(
             "published"
         )
     uniform = measured(recording)
-    require_moving_stem(uniform, valve, settings, recording.stamped is not None)
+    require_moving_stem(uniform, valve, settings)
     stamped = stamped_record(recording)
     part = moving_part(stamped)
     record = part.record
@@ -446,17 +446,12 @@ def _of_force_balance(
 
 
 def require_moving_stem(
-    record: MeasuredRecord,
-    valve: Valve,
-    settings: IdentificationSettings,
-    has_own_stamps: bool = False,
+    record: MeasuredRecord, valve: Valve, settings: IdentificationSettings
 ) -> None:
     """Refuse a record whose stem does not move both ways within the travel."""
     excitation.require_drive(record, valve)
     require_plausible_units(record, valve, settings)
-    window = settings.published_window
-    if has_own_stamps:
-        window = int(np.clip(len(record) // _WINDOWS, _SHORTEST_WINDOW, window))
+    window = int(np.clip(len(record) // _WINDOWS, _SHORTEST_WINDOW, settings.published_window))
     excitation.require_enough_samples(record, window)
     excitation.require_motion(record, valve.travel)
     excitation.require_two_directions(record, window, valve.travel)

@@ -112,7 +112,7 @@ def require_drive(recording: Recording, valve: Valve) -> None:
 
 
 def require_enough_samples(recording: Recording, window: int) -> None:
-    """Refuse a recording shorter than ten derivative windows of the published method.
+    """Refuse a recording shorter than ten windows of so many samples.
 
     A sample period that no recorder has is refused, too: its unit of time is wrong.
     """
