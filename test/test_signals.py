@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Derivatives, noise, smoothing and holds of one signal."""
+"""Derivatives, noise and smoothing of one signal."""
 
 import math
 
@@ -20,9 +20,7 @@ from scipy.signal import find_peaks, oaconvolve, savgol_coeffs, savgol_filter
 from scipy.stats import norm
 
 from valve_friction_ros import signals
-from valve_friction_ros.model.recording import StampedSignal
 from valve_friction_ros.signals import (
-    as_sent_on_change,
     differentiate,
     find_corners,
     longest_faithful_window,
@@ -32,7 +30,6 @@ from valve_friction_ros.signals import (
     sensor_noise,
     smooth_between,
     velocity_noise,
-    without_repeats,
 )
 
 EPS = np.finfo(float).eps
@@ -292,94 +289,3 @@ class TestWithoutScipy:
         signal, weights = rng.normal(size=size), rng.normal(size=window) / window
         expected = oaconvolve(signal, weights, mode="valid")
         assert signals._convolved(signal, weights) == pytest.approx(expected, abs=1e-13)
-
-
-PERIOD = 1e-3
-
-
-def noisy(count, generator):
-    time = np.arange(count) * PERIOD
-    return time, np.sin(3 * time) + 0.01 * generator.standard_normal(count)
-
-
-@pytest.mark.parametrize("hold", [2, 5, 20, 250])
-def test_a_held_signal_keeps_its_fresh_values(hold):
-    time, values = noisy(200 * hold, np.random.default_rng(hold))
-    found = without_repeats(StampedSignal(time, np.repeat(values[::hold], hold)))
-    np.testing.assert_array_equal(found.time, time[hold::hold])
-    np.testing.assert_array_equal(found.value, values[hold::hold])
-
-
-def test_a_value_that_came_twice_keeps_its_place():
-    """A converter's steps: at rest the source sends the same value again and again."""
-    generator, hold = np.random.default_rng(1), 20
-    time = np.arange(40_000) * PERIOD
-    values = 0.02 * np.rint((np.sin(0.5 * time) + 0.02 * generator.standard_normal(40_000)) / 0.02)
-    found = without_repeats(StampedSignal(time, np.repeat(values[::hold], hold)))
-    place = found.time / (hold * PERIOD)
-    np.testing.assert_allclose(place, np.rint(place), atol=1e-6)
-    np.testing.assert_allclose(np.diff(found.time), hold * PERIOD)
-
-
-def test_jittering_holds_are_found():
-    """A source whose period is no multiple of that of the messages."""
-    generator = np.random.default_rng(2)
-    time = np.arange(60_000) * PERIOD
-    fresh = generator.standard_normal(60_000)
-    values = fresh[(time / 0.0203).astype(int)]
-    found = without_repeats(StampedSignal(time, values))
-    assert np.unique(found.value).size == pytest.approx(60 / 0.0203, abs=2)
-    assert found.period == pytest.approx(0.02)
-
-
-@pytest.mark.parametrize("step", [0.0, 0.02])
-def test_noise_is_not_held(step):
-    time, values = noisy(20_000, np.random.default_rng(3))
-    signal = StampedSignal(time, step * np.rint(values / step) if step else values)
-    assert without_repeats(signal) is signal
-
-
-def test_a_converter_behind_a_slow_stem_is_not_held():
-    """Its values stay, and change by one step each."""
-    time = np.arange(20_000) * PERIOD
-    signal = StampedSignal(time, 0.01 * np.rint(time / 0.1))
-    assert without_repeats(signal) is signal
-
-
-def test_a_constant_signal_is_returned():
-    signal = StampedSignal(np.arange(100.0), np.ones(100))
-    assert without_repeats(signal) is signal
-
-
-class TestSentOnChange:
-    """A stem that sticks and jumps, sent when it has moved by more than 0.1 mm."""
-
-    @pytest.fixture
-    def stem(self):
-        """Jumps of 1 mm, a second or two apart, each sent within 20 ms; then a slow way back."""
-        generator = np.random.default_rng(4)
-        moments = np.cumsum(generator.uniform(1.0, 2.0, 12))
-        jumps = [(t + 0.01 * k, n + 0.5 * k) for n, t in enumerate(moments) for k in (1, 2)]
-        slow = [(moments[-1] + 0.4 * k, moments.size - 0.1 * k) for k in range(1, 30)]
-        time, place = np.array([(0.0, 0.0), *jumps, *slow]).T
-        return StampedSignal(time, 1e-3 * place)
-
-    def test_it_stands_until_it_jumps(self, stem):
-        found = as_sent_on_change(stem)
-        added = np.setdiff1d(found.time, stem.time)
-        assert added.size == 12
-        for time in added:
-            k = np.searchsorted(stem.time, time)
-            assert found.value[found.time == time] == stem.value[k - 1]
-            assert 0 < stem.time[k] - time < 0.02
-
-    def test_what_is_sent_by_the_clock_is_as_it_was(self):
-        time = np.arange(500) * 0.01
-        signal = StampedSignal(time, 1e-3 * np.sign(np.sin(time)))
-        assert as_sent_on_change(signal) is signal
-
-    def test_lost_samples_are_no_dead_band(self):
-        """A ramp of which every tenth sample, and half a second, is lost."""
-        kept = np.array([k for k in range(1000) if k % 10 and not 300 < k < 350])
-        signal = StampedSignal(0.01 * kept, 1e-4 * kept)
-        assert as_sent_on_change(signal) is signal

@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Derivatives, noise, smoothing, runs and holds of one signal; no ROS.
+"""Derivatives, noise, smoothing and runs of one signal; no ROS.
 
 Inequalities decide whether the simulated stem rests or slides, so the effect of pressure noise does
 not average to zero. A plain smoother rounds the corners where the commanded pressure changes, which
@@ -547,80 +547,3 @@ def all_around(which: NDArray[np.bool_], reach: int) -> NDArray[np.bool_]:
     sums = np.concatenate([[0], np.cumsum(np.pad(which, reach, mode="edge"))])
     width = 2 * reach + 1
     return np.asarray(sums[width:] - sums[:-width] == width)
-
-
-_FEWEST_CHANGES = 20
-_SHORTER_HOLD = 0.6
-_FEW_SHORTER = 0.02
-"""A held signal has at least `_FEWEST_CHANGES` changes, and fewer than `_FEW_SHORTER` of its runs
-of equal values are shorter than `_SHORTER_HOLD` of the usual run: noise changes at any time."""
-
-_LARGER_STEP = 1.5
-_MANY_LARGER = 0.2
-"""More than `_MANY_LARGER` of its changes exceed the least change by the factor `_LARGER_STEP`: a
-converter that follows a slow stem changes by single steps, at any time."""
-
-
-def without_repeats(signal: StampedSignal) -> StampedSignal:
-    """Keep only the fresh values of a held signal, at the stamps of their first appearance.
-
-    A repeated value adds nothing and is wrong at the time of its repetition. A signal that is not
-    held is returned unchanged. If the source sent the same value again, the sample at that time is
-    kept.
-    """
-    steps = np.diff(signal.value)
-    changes = np.flatnonzero(steps) + 1
-    if changes.size < _FEWEST_CHANGES:
-        return signal
-    runs, jumps = np.diff(changes), np.abs(steps[changes - 1])
-    shortest = float(np.quantile(runs, 2 * _FEW_SHORTER))
-    hold = float(np.median(runs[runs < 2 * shortest]))
-    is_steady = np.mean(runs < _SHORTER_HOLD * hold) < _FEW_SHORTER
-    is_free = np.mean(jumps > _LARGER_STEP * jumps.min()) > _MANY_LARGER
-    if hold < 2 or not (is_steady and is_free):
-        return signal
-    sent = np.maximum(np.rint(runs / hold), 1.0).astype(np.intp)
-    again = np.arange(sent.sum()) - np.repeat(np.cumsum(sent) - sent, sent)
-    fresh = np.repeat(changes[:-1], sent) + np.rint(again * np.repeat(runs / sent, sent)).astype(
-        np.intp
-    )
-    fresh = np.append(fresh, changes[-1])
-    if fresh.size < StampedSignal.FEWEST:
-        return signal
-    return StampedSignal(signal.time[fresh], signal.value[fresh])
-
-
-_IRREGULAR_GAP = 3.0
-_REGULAR_SHARE = 0.8
-_EVEN_STEP = 0.5
-"""Conditions of a signal that is sent on change. Its longest pause exceeds `_IRREGULAR_GAP` usual
-pauses, at most `_REGULAR_SHARE` of its pauses are about as short as the shortest, and its steps are
-hardly ever smaller than `_EVEN_STEP` of the usual step. Lost samples leave the other pauses equal;
-a sensor that samples at its own rate has steps of any size."""
-
-_JUMP = 2.0
-"""Dead bands beyond which a change after a pause is a jump: slower ones are sent as they occur."""
-
-
-def as_sent_on_change(signal: StampedSignal) -> StampedSignal:
-    """Hold each value of a signal that is sent on change until just before the next jump.
-
-    A source with a dead band is silent while its value hardly changes. A straight line over such a
-    pause would move a stem that sticks while the force on it grows. Other signals are returned
-    unchanged.
-    """
-    pauses, steps = np.diff(signal.time), np.abs(np.diff(signal.value))
-    usual = float(np.median(pauses))
-    if steps.size < _FEWEST_CHANGES or pauses.max() < _IRREGULAR_GAP * usual:
-        return signal
-    shortest = float(np.quantile(pauses, _FEW_SHORTER))
-    soon = steps[pauses < 0.5 * pauses.max()]
-    least = float(np.quantile(soon, 0.05))
-    is_regular = np.mean(pauses < 1.5 * shortest) > _REGULAR_SHARE
-    if is_regular or least < _EVEN_STEP * float(np.median(steps)):
-        return signal
-    jumps = np.flatnonzero((steps > _JUMP * least) & (pauses > 2.0 * shortest)) + 1
-    return StampedSignal(
-        np.insert(signal.time, jumps, signal.time[jumps] - shortest),
-        np.insert(signal.value, jumps, signal.value[jumps - 1]),
-    )

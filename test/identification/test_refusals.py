@@ -285,6 +285,26 @@ def test_turns_within_the_noise_are_none():
     require_two_directions(record(noise + turns), 25)
 
 
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("noise", [2e-6, 2e-5, 6e-5])
+def test_the_noise_of_an_interpolated_record_is_no_way_back(noise, seed):
+    """A stem that opens in half an hour, scanned every 2 s and exported once a second."""
+    generator = np.random.default_rng(seed)
+    scans = np.arange(0.37, 2200.0, 2.0)
+    stem = np.interp(scans, [250.0, 2100.0], [0.0, 0.016])
+    stem = stem + noise * generator.standard_normal(scans.size)
+    exported = record(np.interp(np.arange(1.0, 2190.0), scans, stem), period=1.0)
+    text = refusal(require_two_directions, exported, 31, 0.032)
+    assert text.startswith("the stem moved only up (1")
+
+
+def test_a_stem_that_yields_both_ways_did_not_slide():
+    assert refusal(require_two_directions, record(triangle(1e-4, 1e-4)), 1, 0.04) == (
+        "the stem moved 0.1 mm up and 0.1 mm down, no more than a packing may yield before the "
+        "stem slides: move the valve over several percent of its travel"
+    )
+
+
 @pytest.mark.parametrize(
     ("lowest", "highest", "passes"),
     [

@@ -22,10 +22,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from valve_friction_ros.held_signals import without_repeats
 from valve_friction_ros.model.checks import require_finite, require_non_negative, require_positive
 from valve_friction_ros.model.recording import StampedSignal
 from valve_friction_ros.model.valve import Valve
-from valve_friction_ros.signals import position_noise, quantisation_step, without_repeats
+from valve_friction_ros.signals import position_noise, quantisation_step
 from valve_friction_ros.streams import DAY
 from valve_friction_ros.streams.samples import Arrivals, Kind, Samples
 

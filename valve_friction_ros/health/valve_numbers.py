@@ -19,6 +19,7 @@ import scipy
 from numpy.typing import NDArray
 
 from valve_friction_ros.health.measured import DIFFERENCES, Measured
+from valve_friction_ros.held_signals import without_repeats
 from valve_friction_ros.identification.drawing import IMPERFECTIONS_FOUND
 from valve_friction_ros.identification.refusal import LittleMotionError, RefusalError
 from valve_friction_ros.identification.result import Result
@@ -36,13 +37,7 @@ from valve_friction_ros.identification.trust.uncertainty import COMPARABLE, SPEE
 from valve_friction_ros.identification.trust.verdict import Parameter, Verdict
 from valve_friction_ros.model.recording import Recording, StampedSignal
 from valve_friction_ros.model.valve import Valve
-from valve_friction_ros.signals import (
-    quantisation_step,
-    runs_of,
-    sensor_noise,
-    stamped_noise,
-    without_repeats,
-)
+from valve_friction_ros.signals import quantisation_step, runs_of, sensor_noise, stamped_noise
 
 _MEAN = 0.1
 """Averaging time of the stem position, s."""

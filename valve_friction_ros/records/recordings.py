@@ -11,12 +11,14 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from valve_friction_ros.held_signals import LARGEST_DEAD_BAND
+from valve_friction_ros.identification.engine.lags import SLOW_SAMPLING
 from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.model.drive import Drive
 from valve_friction_ros.model.recording import Recording
@@ -135,6 +137,50 @@ def _drive(
     return drive, Drive.PRESSURE
 
 
+_SCAN, _LONG = 0.1, 10.0
+_FEWEST_PAUSES, _OF_SLOW, _OF_FAST = 10, 0.1, 0.5
+_AS_BEFORE, _ALIKE = 0.8, 1.3
+_MOST_HELD = 1_000_000
+"""Conditions of a compressed signal. Pauses of more than `_LONG` scans, whose period is the `_SCAN`
+quantile of all pauses, take the share `_OF_SLOW` of its time or more, `_OF_FAST` if the scans are
+fast: those of a fast sensor may be lost samples. After the share `_AS_BEFORE` of them, the value is
+within a dead band of the one before. Pauses and the samples between them are not all of about one
+length, up to `_ALIKE` of the usual one. At most about `_MOST_HELD` values are held."""
+
+
+def _held(read: ReadSignal) -> tuple[ReadSignal, tuple[str, ...]]:
+    """Repeat each stored value of a compressed signal up to the next; return a note with it.
+
+    Other signals are returned unchanged, without a note, such as samples in bunches of one length
+    with pauses of one length: a gateway has stamped them on arrival.
+    """
+    pauses = np.diff(read.stamps)
+    scan = float(np.quantile(pauses, _SCAN)) if pauses.size else 0.0
+    long = np.flatnonzero(pauses > _LONG * scan)
+    if long.size < _FEWEST_PAUSES or scan <= 0.0:
+        return read, ()
+    least = _OF_SLOW if scan > 1e9 * SLOW_SAMPLING else _OF_FAST
+    changes = np.abs(np.diff(read.values))[long] <= LARGEST_DEAD_BAND * np.ptp(read.values)
+    regular = (np.max(one) <= _ALIKE * np.median(one) for one in (pauses[long], np.diff(long)))
+    if (
+        np.sum(pauses[long]) < least * np.sum(pauses)
+        or np.mean(changes) < _AS_BEFORE
+        or all(regular)
+    ):
+        return read, ()
+    step = max(scan, float(np.sum(pauses)) / _MOST_HELD)
+    times = np.append(np.maximum(np.rint(pauses / step).astype(np.intp), 1), 1)
+    which = np.repeat(np.arange(times.size), times)
+    since = np.arange(which.size) - np.repeat(np.cumsum(times) - times, times)
+    after = (since / times[which] * np.append(pauses, 0)[which]).astype(np.int64)
+    note = (
+        f"{read.signal.name!r} is compressed: each of its {times.size} stored values is held until "
+        "the next"
+    )
+    held = read.where(which)
+    return replace(held, stamps=held.stamps + after), (note,)
+
+
 def _recorded(
     table: OpenTables, reads: Sequence[ReadSignal], valve: Valve
 ) -> tuple[Recording, tuple[str, ...]]:
@@ -142,6 +188,7 @@ def _recorded(
     form = table.layout.form
     for each in reads:
         require_good(each, form)
+    reads, compressed = zip(*map(_held, reads), strict=True)
     if doubts := table.doubts(reads):
         raise ValueError(table.asked(doubts))
     drives = [each for each in reads if each.signal.quantity != "position"]
@@ -165,6 +212,7 @@ def _recorded(
     except RefusalError as refusal:
         raise RefusalError(f"{table.name}: {refusal}") from None
     notes = [] if table.layout.is_own else [table.layout.words]
+    notes += [note for of_one in compressed for note in of_one]
     notes += [told for each in reads for told in (left_out(each), jumps_to_zero(each)) if told]
     return recording, tuple(notes)
 

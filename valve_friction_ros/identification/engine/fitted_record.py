@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from valve_friction_ros.held_signals import without_repeats
 from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.identification.trust.uncertainty import MEDIAN_MAGNITUDE
 from valve_friction_ros.model.recording import StampedRecord, StampedSignal
@@ -28,7 +29,6 @@ from valve_friction_ros.signals import (
     smoothing_leverage,
     smoothing_of,
     stamped_noise,
-    without_repeats,
 )
 
 _LONGEST_PERIOD = 5e-3

@@ -195,8 +195,9 @@ _FAR = 0.5
 """Share of that work by which a fit may differ from it before it is doubted, however well it
 follows the stem: a lag alone explains less."""
 
-ROUNDING = "rounding"
-"""Source of the uncertainty of a number: the step of the converter of the force."""
+ROUNDING, DEAD_BAND = "rounding", "dead_band"
+"""Sources of the uncertainty of a number: the step of the converter of the force, and the dead band
+of a historian."""
 
 _FINEST = {SLIDING: FINEST_SLIDING, "spring_constant": 2e-4}
 _FINEST_OTHER = 5e-4
@@ -208,10 +209,11 @@ class Estimated:
     """A number with its interval, SI unit, and its standard uncertainty by origin (after the GUM).
 
     `record` is from noise, misfit and imperfections of the record, `timing` from the lag between
-    the signals, and `sources` from each imperfection whose prior matters, timing included, and from
-    the force's converter. The record does not determine the `shared` part of the timing: another
-    record of the same sensors has the same error. The `rival` is the value if a slow sensor of the
-    stem, and not viscous friction, made the stem late; nan where the record excludes that.
+    the signals, and `sources` from each imperfection whose prior matters, timing included, from the
+    force's converter and from a historian. The record does not determine the `shared` part of the
+    timing: another record of the same sensors has the same error. The `rival` is the value if a
+    slow sensor of the stem, and not viscous friction, made the stem late; nan where the record
+    excludes that.
     """
 
     value: float

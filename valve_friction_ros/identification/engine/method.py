@@ -18,6 +18,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from valve_friction_ros.held_signals import (
+    as_archived,
+    as_sent_on_change,
+    dead_band,
+    without_repeats,
+)
 from valve_friction_ros.identification.drawing import FRICTION_CURVE, IMPERFECTIONS_FOUND
 from valve_friction_ros.identification.engine import verdicts
 from valve_friction_ros.identification.engine.balance_regression import SECOND_ORDER
@@ -34,13 +40,14 @@ from valve_friction_ros.identification.engine.friction_curve import (
 )
 from valve_friction_ros.identification.engine.intervals import (
     ASYMMETRY,
+    DEAD_BAND,
     Estimated,
     NumbersAt,
     estimated,
     found_sizes,
     reported_numbers,
 )
-from valve_friction_ros.identification.engine.lags import LagPrior, LagProfile
+from valve_friction_ros.identification.engine.lags import SLOW_SAMPLING, LagPrior, LagProfile
 from valve_friction_ros.identification.engine.levels import curve_of_levels
 from valve_friction_ros.identification.engine.moving_part import MovingPart, moving_part
 from valve_friction_ros.identification.engine.posterior_fit import PosteriorFit
@@ -84,7 +91,7 @@ from valve_friction_ros.identification.trust.verdict import (
 )
 from valve_friction_ros.model.recording import Recording, StampedRecord, StampedSignal
 from valve_friction_ros.model.valve import KarnoppParameters, Valve
-from valve_friction_ros.signals import MeasuredRecord, as_sent_on_change, measured, without_repeats
+from valve_friction_ros.signals import MeasuredRecord, measured
 from valve_friction_ros.wording import two_digits
 
 _WINDOWS, _SHORTEST_WINDOW = 10, 3
@@ -180,6 +187,7 @@ def _identified(
         force = float(np.ptp(valve.force_per_drive * record.drive.value))
         outcome = _of_force_balance(curves, balanced, settings, str(refusal), force)
     outcome = _as_sampled(_with_departures(outcome, departed), record, lag, curves, levels)
+    outcome = _as_stored(outcome, record, valve)
     published, beside = published_beside(uniform, valve, settings)
     misfit = outcome.misfit
     return Result(
@@ -405,6 +413,38 @@ def _as_sampled(
     )
 
 
+def _as_stored(outcome: _Outcome, record: StampedRecord, valve: Valve) -> _Outcome:
+    """Widen the friction by what a historian has not stored of the force and of the spring.
+
+    A dead band hides what a converter with that step would round off, on one side of the signal as
+    long as it moves one way: no averaging removes it.
+    """
+    if record.drive.period <= SLOW_SAMPLING and record.position.period <= SLOW_SAMPLING:
+        return outcome
+    force = valve.force_per_drive * dead_band(record.drive)
+    spring = outcome.parameters["spring_constant"].value
+    if not spring > 0.0:
+        spring = valve.force_per_drive * np.ptp(record.drive.value) / np.ptp(record.position.value)
+    hidden = math.hypot(force, spring * dead_band(record.position)) / math.sqrt(12.0)
+    if hidden == 0.0:
+        return outcome
+    parameters, numbers = dict(outcome.parameters), dict(outcome.numbers)
+    for name in (SLIDING, "coulomb_friction", "static_friction"):
+        known, one = parameters.get(name), numbers.get(name)
+        if known is None or one is None or known.verdict is Verdict.FIXED:
+            continue
+        numbers[name] = wider = replace(
+            one,
+            half_width=math.hypot(one.half_width, NORMAL_QUANTILE * hidden),
+            record=math.hypot(one.record, hidden),
+            sources={**one.sources, DEAD_BAND: hidden},
+        )
+        if math.isfinite(known.value):
+            width = math.hypot(known.half_width, NORMAL_QUANTILE * hidden)
+            parameters[name] = verdicts.judged(name, wider, width, known.reason)
+    return outcome._replace(parameters=parameters, numbers=numbers)
+
+
 def _sliding_speed(fit: PosteriorFit, curves: Sequence[FrictionCurve]) -> float:
     """Return the mean speed over the distance, m/s; simulated if it agrees with the measured one.
 
@@ -464,16 +504,21 @@ def stamped_record(recording: Recording) -> StampedRecord:
     if (stamped := recording.stamped) is not None:
         return replace(
             stamped,
-            drive=as_sent_on_change(stamped.drive),
-            position=as_sent_on_change(stamped.position),
+            drive=as_sent_on_change(_as_archived(stamped.drive)),
+            position=as_sent_on_change(_as_archived(stamped.position)),
         )
     excitation.require_unbroken(recording)
     time = recording.time
     return StampedRecord(
-        StampedSignal(time, recording.drive),
-        StampedSignal(time, recording.position),
+        _as_archived(StampedSignal(time, recording.drive)),
+        _as_archived(StampedSignal(time, recording.position)),
         recording.driven_by,
     )
+
+
+def _as_archived(signal: StampedSignal) -> StampedSignal:
+    """Undo the interpolation of a historian, none of which samples as fast as a sensor."""
+    return signal if signal.period <= SLOW_SAMPLING else as_archived(signal)
 
 
 def prior_of(

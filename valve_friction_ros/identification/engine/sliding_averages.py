@@ -16,16 +16,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from valve_friction_ros.held_signals import without_repeats
 from valve_friction_ros.identification.engine.lags import SLOW_SAMPLING, LagPrior
 from valve_friction_ros.identification.trust.uncertainty import MEDIAN_MAGNITUDE
 from valve_friction_ros.model.recording import StampedRecord, StampedSignal
 from valve_friction_ros.model.valve import Valve
-from valve_friction_ros.signals import (
-    all_around,
-    quantisation_step,
-    stamped_noise,
-    without_repeats,
-)
+from valve_friction_ros.signals import all_around, quantisation_step, stamped_noise
 
 _Array = NDArray[np.float64]
 

@@ -16,9 +16,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from valve_friction_ros.held_signals import without_repeats
 from valve_friction_ros.identification.engine.coordinates import IMPERFECTIONS, TIMING, Profile
 from valve_friction_ros.identification.engine.friction_curve import FrictionCurve
 from valve_friction_ros.identification.engine.intervals import (
+    DEAD_BAND,
     NOISE_LIKE,
     NOT_QUITE,
     ROUNDING,
@@ -43,7 +45,7 @@ from valve_friction_ros.identification.trust.verdict import (
     with_verdict,
 )
 from valve_friction_ros.model.recording import StampedRecord, StampedSignal
-from valve_friction_ros.signals import quantisation_step, stamped_noise, without_repeats
+from valve_friction_ros.signals import quantisation_step, stamped_noise
 from valve_friction_ros.wording import percentage, two_digits
 
 _SURE = 3.0
@@ -55,6 +57,7 @@ The slip force cannot be negative, so that noise alone makes it positive."""
 _OTHERS = {
     "start_position": "initial stem position",
     ROUNDING: "force within one step of the converter",
+    DEAD_BAND: "changes within the dead band of the historian",
 }
 """Words for the sources of uncertainty that are not imperfections."""
 
@@ -203,9 +206,10 @@ def _value_remarks(name: str, signal: StampedSignal, size: float, unit: str) -> 
     step = quantisation_step(signal.value)
     noise = stamped_noise(signal)
     if held > _HELD:
+        time = held * signal.period
         remarks.append(
-            f"values of {name} hold for {1e3 * held * signal.period:.2g} ms: a slow source, or "
-            "the dead band of a historian"
+            f"values of {name} hold for {f'{1e3 * time:.2g} ms' if time < 1.0 else f'{time:.2g} s'}"
+            ": a slow source, or the dead band of a historian"
         )
     if step > _COARSE * noise:
         remarks.append(

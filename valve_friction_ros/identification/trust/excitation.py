@@ -181,7 +181,8 @@ def require_two_directions(recording: Recording, window: int, travel: float = ma
 
     The position is averaged over `window` samples first, and over fewer where these take longer
     than a move may. Turns within its noise are ignored, and so is a distance that a packing may
-    yield elastically before it slides, a share of the `travel` of the valve, m.
+    yield elastically before it slides, a share of the `travel` of the valve, m. So few samples do
+    not show how large the noise of an interpolated record is: there a turn is a share of the range.
     """
     require_enough_samples(recording, window)
     elastic = _ELASTIC * travel if math.isfinite(travel) else 0.0
@@ -191,9 +192,16 @@ def require_two_directions(recording: Recording, window: int, travel: float = ma
         means = len(recording) // length
         position = recording.position[: means * length].reshape(means, length).mean(axis=1)
         noise = measured(recording).white_noise / np.sqrt(length)
-        ways.append(_distances(position, _MOTION_OVER_NOISE * noise))
+        least = 0.0 if length == window else _LEAST_SHARE_OF_DIRECTION * float(np.ptp(position))
+        ways.append(_distances(position, max(_MOTION_OVER_NOISE * noise, least)))
     if all(min(one) < max(_LEAST_SHARE_OF_DIRECTION * sum(one), elastic) for one in ways):
         up, down = ways[0]
+        if max(up, down) < elastic:
+            raise LittleMotionError(
+                f"the stem moved {up * 1e3:.3g} mm up and {down * 1e3:.3g} mm down, no more than "
+                "a packing may yield before the stem slides: move the valve over several percent "
+                "of its travel"
+            )
         way = "up" if up > down else "down"
         raise LittleMotionError(
             f"the stem moved only {way} ({up * 1e3:.3g} mm up, {down * 1e3:.3g} mm down): "

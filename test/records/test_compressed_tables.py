@@ -1,0 +1,169 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""Exports of a historian that stores a value only when it has left a dead band."""
+
+from datetime import datetime, timedelta
+
+import numpy as np
+import pytest
+from records import assert_held, simulated
+
+from valve_friction_ros.identification import RefusalError, identify_plant
+from valve_friction_ros.identification.trust.uncertainty import mean_sliding_friction
+from valve_friction_ros.model import BENCH_VALVE, HIGH_FRICTION, SensorNoise, simulate
+from valve_friction_ros.records.columns import Columns
+from valve_friction_ros.records.recordings import ReadingOptions, read_recordings
+
+BEGIN = datetime(2026, 3, 13, 7, 5)
+TRAVEL = BENCH_VALVE.travel
+COLUMNS = Columns(
+    pressure_column="FV-7.PT",
+    position_column="FV-7.ZT",
+    pressure_unit="bar",
+    position_unit="percent",
+    time_zone="UTC",
+)
+
+
+def stored(values, dead_band, heartbeat=600):
+    """Rows that leave the dead band, those before them, and one after each heartbeat."""
+    rows = [0]
+    for row in range(1, values.size):
+        if abs(values[row] - values[rows[-1]]) > dead_band:
+            rows += [row - 1, row]
+        elif row - rows[-1] >= heartbeat:
+            rows.append(row)
+    return np.unique(rows)
+
+
+def slow_levels(seed, count=7200):
+    """Two hours of slow moves between levels, at 10 Hz."""
+    generator = np.random.default_rng(seed)
+    edges = np.cumsum(generator.uniform(20.0, 240.0, 80))
+    places = np.repeat(generator.uniform(0.1, 0.9, 41), 2)[1:81]
+    share = np.interp(np.arange(10 * count) / 10, edges, places)
+    return 41_740.0 + 165_100.0 * share
+
+
+@pytest.fixture
+def export(tmp_path):
+    """Function of tag, times in s, and values in rows: a long table of both tags."""
+
+    def export(*signals):
+        rows = [
+            (time, f"{tag};{(BEGIN + timedelta(seconds=float(time))).isoformat()};{value:.4f}")
+            for tag, times, values in signals
+            for time, value in zip(times, values, strict=True)
+        ]
+        path = tmp_path / "export.csv"
+        path.write_text("\n".join(["tag;time;value", *(row for _, row in sorted(rows))]) + "\n")
+        return path
+
+    return export
+
+
+def read(path):
+    (found,) = read_recordings(path, BENCH_VALVE, ReadingOptions(COLUMNS))
+    return found
+
+
+def sampled(seed):
+    """Pressure, bar, and stem, %, once a second, with noise; and the sliding friction, N."""
+    pressure = slow_levels(seed)
+    motion = simulate(BENCH_VALVE, HIGH_FRICTION, pressure, 0.1)
+    record = SensorNoise(2e-5, 100.0, seed).applied_to(simulated(pressure, 0.1, HIGH_FRICTION))
+    truth = mean_sliding_friction(HIGH_FRICTION, motion.velocity)
+    return record.pressure[::10] / 1e5, 100.0 * record.position[::10] / TRAVEL, truth
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_the_friction_is_found(export, seed):
+    """As it is where the historian itself interpolates the stored values once a second."""
+    pressure, stem, truth = sampled(seed)
+    tags = [
+        ("FV-7.PT", stored(pressure, 0.005), pressure),
+        ("FV-7.ZT", stored(stem, 0.3), stem),
+    ]
+    path = export(*((tag, rows, values[rows]) for tag, rows, values in tags))
+    found = read(path)
+    notes = [note for note in found.notes if "is compressed" in note]
+    assert [note.partition(" is")[0] for note in notes] == ["'FV-7.PT'", "'FV-7.ZT'"]
+    for (_, rows, _), note in zip(tags, notes, strict=True):
+        assert f"each of its {rows.size} stored values" in note
+    time = np.arange(pressure.size)
+    path = export(*((tag, time, np.interp(time, rows, y[rows])) for tag, rows, y in tags))
+    for recorded in (found, read(path)):
+        parameters = identify_plant(recorded.recording(), BENCH_VALVE).parameters
+        assert_held(parameters, {"sliding_friction": truth})
+        width = parameters["sliding_friction"].half_width
+        # 1.96/√12 of the force in a dead band, and of the spring in that of the stem.
+        hidden = np.hypot(0.0445 * 500.0, 0.003 * TRAVEL * HIGH_FRICTION.spring_constant)
+        assert 0.5 * hidden < width < 0.1 * truth
+
+
+def test_each_value_is_held_until_the_next(export):
+    pressure, stem, _ = sampled(0)
+    rows = stored(stem, 0.3)
+    recording = read(
+        export(("FV-7.PT", np.arange(7200), pressure), ("FV-7.ZT", rows, stem[rows]))
+    ).recording()
+    assert not recording.gap
+    assert recording.sample_period == 1.0
+    time = np.rint(recording.time).astype(int)
+    held = stem[rows][np.searchsorted(rows, time, side="right") - 1]
+    np.testing.assert_allclose(recording.position, np.round(held, 4) / 100 * TRAVEL, rtol=1e-12)
+    np.testing.assert_allclose(recording.drive, 1e5 * np.round(pressure[time], 4), rtol=1e-12)
+
+
+def test_a_month_is_held_with_bounded_memory(export):
+    """The stem moves once or twice a day; one value a second would be 2.7 million."""
+    generator = np.random.default_rng(4)
+    counts, levels = generator.integers(10, 60, 31), generator.uniform(0.0, 100.0, 32)
+    begins = np.cumsum(generator.uniform(10_000, 160_000, 31)).astype(int)
+    times = np.concatenate([begin + np.arange(n) for begin, n in zip(begins, counts, strict=True)])
+    stem = np.concatenate([np.linspace(*levels[day : day + 2], n) for day, n in enumerate(counts)])
+    moved = read(export(("FV-7.PT", times, 1.0 + stem / 200), ("FV-7.ZT", times, stem)))
+    assert "is compressed" in str(moved.notes)
+    assert 900_000 < len(moved.recording()) < 1_100_000
+
+
+def outages(count, length):
+    """Times at 100 Hz with outages of varied length, s."""
+    time = np.arange(6000) / 100
+    lost = np.zeros(time.size, dtype=bool)
+    for index, begin in enumerate(np.linspace(300, 5500, count).astype(int)):
+        lost[begin : begin + round(100 * length * (0.5 + index % 3))] = True
+    return time[~lost]
+
+
+def test_outages_of_a_fast_sensor_are_gaps(export):
+    time = outages(12, 0.5)
+    stem = 50.0 + 40.0 * np.sin(time)
+    found = read(export(("FV-7.PT", time, 1.0 + stem / 200), ("FV-7.ZT", time, stem)))
+    assert "is compressed" not in str(found.notes)
+    assert "gap of 1.2" in found.recording().gap
+
+
+def test_bunches_are_not_compressed(export):
+    """Twenty samples on arrival, every 10 s."""
+    time = np.concatenate([10.0 * bunch + 0.05 * np.arange(20) for bunch in range(40)])
+    stem = 50.0 + 3.0 * np.sin(0.02 * time)
+    with pytest.raises(RefusalError, match=r"gap of 9\.05 s"):
+        read(export(("FV-7.PT", time, 1.0 + stem / 200), ("FV-7.ZT", time, stem))).recording()
+
+
+def test_values_that_differ_after_each_pause_are_lost(export):
+    """A collector that was off most of the time, while the valve moved on."""
+    generator = np.random.default_rng(3)
+    begins = np.cumsum(generator.uniform(100.0, 600.0, 30))
+    time = np.concatenate([begin + np.arange(20.0) for begin in begins])
+    stem = np.repeat(generator.uniform(0.0, 100.0, 30), 20)
+    with pytest.raises(RefusalError, match="gaps take"):
+        read(export(("FV-7.PT", time, 1.0 + stem / 200), ("FV-7.ZT", time, stem))).recording()

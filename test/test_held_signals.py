@@ -1,0 +1,225 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""Signals whose source repeats, omits or interpolates values."""
+
+import numpy as np
+import pytest
+
+from valve_friction_ros.held_signals import (
+    as_archived,
+    as_sent_on_change,
+    dead_band,
+    without_repeats,
+)
+from valve_friction_ros.model.recording import StampedSignal
+
+PERIOD = 1e-3
+
+
+def noisy(count, generator):
+    time = np.arange(count) * PERIOD
+    return time, np.sin(3 * time) + 0.01 * generator.standard_normal(count)
+
+
+@pytest.mark.parametrize("hold", [2, 5, 20, 250])
+def test_a_held_signal_keeps_its_fresh_values(hold):
+    time, values = noisy(200 * hold, np.random.default_rng(hold))
+    found = without_repeats(StampedSignal(time, np.repeat(values[::hold], hold)))
+    np.testing.assert_array_equal(found.time, time[hold::hold])
+    np.testing.assert_array_equal(found.value, values[hold::hold])
+
+
+def test_a_value_that_came_twice_keeps_its_place():
+    """A converter's steps: at rest the source sends the same value again and again."""
+    generator, hold = np.random.default_rng(1), 20
+    time = np.arange(40_000) * PERIOD
+    values = 0.02 * np.rint((np.sin(0.5 * time) + 0.02 * generator.standard_normal(40_000)) / 0.02)
+    found = without_repeats(StampedSignal(time, np.repeat(values[::hold], hold)))
+    place = found.time / (hold * PERIOD)
+    np.testing.assert_allclose(place, np.rint(place), atol=1e-6)
+    np.testing.assert_allclose(np.diff(found.time), hold * PERIOD)
+
+
+def test_jittering_holds_are_found():
+    """A source whose period is no multiple of that of the messages."""
+    generator = np.random.default_rng(2)
+    time = np.arange(60_000) * PERIOD
+    fresh = generator.standard_normal(60_000)
+    values = fresh[(time / 0.0203).astype(int)]
+    found = without_repeats(StampedSignal(time, values))
+    assert np.unique(found.value).size == pytest.approx(60 / 0.0203, abs=2)
+    assert found.period == pytest.approx(0.02)
+
+
+@pytest.mark.parametrize("step", [0.0, 0.02])
+def test_noise_is_not_held(step):
+    time, values = noisy(20_000, np.random.default_rng(3))
+    signal = StampedSignal(time, step * np.rint(values / step) if step else values)
+    assert without_repeats(signal) is signal
+
+
+def test_a_converter_behind_a_slow_stem_is_not_held():
+    """Its values stay, and change by one step each."""
+    time = np.arange(20_000) * PERIOD
+    signal = StampedSignal(time, 0.01 * np.rint(time / 0.1))
+    assert without_repeats(signal) is signal
+
+
+def test_a_constant_signal_is_returned():
+    signal = StampedSignal(np.arange(100.0), np.ones(100))
+    assert without_repeats(signal) is signal
+
+
+class TestSentOnChange:
+    """A stem that sticks and jumps, sent when it has moved by more than 0.1 mm."""
+
+    @pytest.fixture
+    def stem(self):
+        """Jumps of 1 mm, a second or two apart, each sent within 20 ms; then a slow way back."""
+        generator = np.random.default_rng(4)
+        moments = np.cumsum(generator.uniform(1.0, 2.0, 12))
+        jumps = [(t + 0.01 * k, n + 0.5 * k) for n, t in enumerate(moments) for k in (1, 2)]
+        slow = [(moments[-1] + 0.4 * k, moments.size - 0.1 * k) for k in range(1, 30)]
+        time, place = np.array([(0.0, 0.0), *jumps, *slow]).T
+        return StampedSignal(time, 1e-3 * place)
+
+    def test_it_stands_until_it_jumps(self, stem):
+        found = as_sent_on_change(stem)
+        added = np.setdiff1d(found.time, stem.time)
+        assert added.size == 12
+        for time in added:
+            k = np.searchsorted(stem.time, time)
+            assert found.value[found.time == time] == stem.value[k - 1]
+            assert 0 < stem.time[k] - time < 0.02
+
+    def test_what_is_sent_by_the_clock_is_as_it_was(self):
+        time = np.arange(500) * 0.01
+        signal = StampedSignal(time, 1e-3 * np.sign(np.sin(time)))
+        assert as_sent_on_change(signal) is signal
+
+    def test_lost_samples_are_no_dead_band(self):
+        """A ramp of which every tenth sample, and half a second, is lost."""
+        kept = np.array([k for k in range(1000) if k % 10 and not 300 < k < 350])
+        signal = StampedSignal(0.01 * kept, 1e-4 * kept)
+        assert as_sent_on_change(signal) is signal
+
+
+class TestArchived:
+    """A level with noise and some moves, stored when it has left a dead band of 0.5 % of 100."""
+
+    TIME = np.arange(4000.0)
+
+    @pytest.fixture
+    def stored(self):
+        """Rows and values that a historian has stored, to three decimals."""
+        generator = np.random.default_rng(5)
+        level = np.repeat(generator.uniform(0.0, 100.0, 20), 200)
+        values = np.round(level + 0.25 * generator.standard_normal(4000), 3)
+        rows = [0]
+        for row in range(1, 4000):
+            if abs(values[row] - values[rows[-1]]) > 0.5:
+                rows += [row - 1, row]
+        rows = np.unique([*rows, 3999])
+        return rows, values[rows]
+
+    def interpolated(self, stored, decimals=3):
+        rows, values = stored
+        return StampedSignal(self.TIME, np.round(np.interp(self.TIME, rows, values), decimals))
+
+    @pytest.mark.parametrize("decimals", [3, 12])
+    def test_each_stored_value_is_held_until_the_next(self, stored, decimals):
+        rows, values = stored
+        found = as_archived(self.interpolated(stored, decimals))
+        held = values[np.searchsorted(rows, self.TIME, side="right") - 1]
+        np.testing.assert_array_equal(found.time, self.TIME)
+        # Where three stored values are on a line by chance, the one between them is not found.
+        assert np.mean(found.value == held) > 0.98
+        assert np.abs(found.value - held).max() < 2.0
+
+    def test_a_scale_does_not_matter(self, stored):
+        signal = self.interpolated(stored)
+        found = as_archived(StampedSignal(signal.time, 2e-4 * signal.value))
+        expected = 2e-4 * as_archived(signal).value
+        assert np.mean(np.isclose(found.value, expected, rtol=1e-12)) > 0.999
+
+    @staticmethod
+    def ramps(count, least, most):
+        """Rounded lines up and down, 30 samples each, whose changes are drawn."""
+        generator = np.random.default_rng(6)
+        ends = np.cumsum(generator.uniform(least, most, count) * np.tile([1.0, -1.0], count // 2))
+        values = np.interp(np.arange(30.0 * count - 29.0), 30.0 * np.arange(count), ends)
+        return StampedSignal(np.arange(values.size), np.round(values, 3))
+
+    def test_a_move_stays_a_line(self):
+        signal = self.ramps(30, 20.0, 40.0)
+        assert np.array_equal(as_archived(signal).value, signal.value)
+
+    def test_a_few_lines_are_moves_of_an_operator(self):
+        few, many = self.ramps(18, 1.0, 20.0), self.ramps(40, 1.0, 20.0)
+        assert as_archived(few) is few
+        assert as_archived(many) is not many
+
+    def test_a_curve_is_no_line(self):
+        """With spikes, between which it is straight from sample to sample."""
+        values = 50.0 * np.sin(2.0 * np.pi * self.TIME / 400.0)
+        values[::37] += 3.0
+        signal = StampedSignal(self.TIME, np.round(values, 1))
+        assert as_archived(signal) is signal
+
+    @pytest.mark.parametrize("step", [0.0, 0.01, 0.1, 1.0])
+    @pytest.mark.parametrize("noise", [0.0, 0.03, 0.3])
+    @pytest.mark.parametrize("period", [50.0, 400.0, 3000.0])
+    def test_a_sampled_signal_is_as_it_was(self, step, noise, period):
+        """With any noise, and as a converter of any step rounds it."""
+        generator = np.random.default_rng(7)
+        values = 50.0 * np.sin(2.0 * np.pi * self.TIME / period)
+        values = values + noise * generator.standard_normal(4000)
+        signal = StampedSignal(self.TIME, step * np.rint(values / step) if step else values)
+        assert as_archived(signal) is signal
+
+    def test_steps_of_an_operator_are_as_they_were(self):
+        """No noise: the valve rests at each level."""
+        values = np.repeat(np.random.default_rng(8).uniform(0.0, 100.0, 40), 100)
+        signal = StampedSignal(self.TIME, values)
+        assert as_archived(signal) is signal
+
+    def test_a_constant_signal_is_returned(self):
+        signal = StampedSignal(self.TIME, np.ones(4000))
+        assert as_archived(signal) is signal
+
+
+class TestDeadBand:
+    TIME = np.arange(10_000.0)
+
+    @pytest.mark.parametrize("share", [0.3, 0.5])
+    @pytest.mark.parametrize("band", [0.2, 0.5, 1.0])
+    def test_of_a_signal_that_is_sent_on_change(self, band, share):
+        """Levels with noise: no change is smaller, and most of them are little larger."""
+        generator = np.random.default_rng(9)
+        level = np.repeat(generator.uniform(0.0, 100.0, 100), 100)
+        values = level + share * band * generator.standard_normal(10_000)
+        held = values.copy()
+        for row in range(1, held.size):
+            if abs(values[row] - held[row - 1]) <= band:
+                held[row] = held[row - 1]
+        found = dead_band(StampedSignal(self.TIME, held))
+        assert band < found < 1.3 * band
+
+    def test_a_sampled_signal_has_none(self):
+        noise = np.random.default_rng(10).standard_normal(10_000)
+        for values in (noise, np.rint(10 * noise), np.sin(self.TIME), np.zeros(10_000)):
+            assert dead_band(StampedSignal(self.TIME, values)) == 0.0
+
+    def test_a_valve_that_rests_between_moves_has_none(self):
+        """Noiseless, at the resolution of a control system: levels of an operator."""
+        ends = np.random.default_rng(11).uniform(0.0, 100.0, 41)
+        rows = np.cumsum(np.tile([90.0, 10.0], 40))
+        values = np.interp(self.TIME, rows, np.repeat(ends, 2)[1:81])
+        assert dead_band(StampedSignal(self.TIME, np.round(values, 1))) == 0.0

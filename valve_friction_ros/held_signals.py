@@ -1,0 +1,166 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""What a source does to its signal: it repeats, omits or interpolates values; no ROS."""
+
+import numpy as np
+
+from valve_friction_ros.model.recording import StampedSignal
+
+_FEWEST_CHANGES = 20
+_SHORTER_HOLD = 0.6
+_FEW_SHORTER = 0.02
+"""A held signal has at least `_FEWEST_CHANGES` changes, and fewer than `_FEW_SHORTER` of its runs
+of equal values are shorter than `_SHORTER_HOLD` of the usual run: noise changes at any time."""
+
+_LARGER_STEP = 1.5
+_MANY_LARGER = 0.2
+"""More than `_MANY_LARGER` of its changes exceed the least change by the factor `_LARGER_STEP`: a
+converter that follows a slow stem changes by single steps, at any time."""
+
+
+def without_repeats(signal: StampedSignal) -> StampedSignal:
+    """Keep only the fresh values of a held signal, at the stamps of their first appearance.
+
+    A repeated value adds nothing and is wrong at the time of its repetition. A signal that is not
+    held is returned unchanged. If the source sent the same value again, the sample at that time is
+    kept.
+    """
+    steps = np.diff(signal.value)
+    changes = np.flatnonzero(steps) + 1
+    if changes.size < _FEWEST_CHANGES:
+        return signal
+    runs, jumps = np.diff(changes), np.abs(steps[changes - 1])
+    shortest = float(np.quantile(runs, 2 * _FEW_SHORTER))
+    hold = float(np.median(runs[runs < 2 * shortest]))
+    is_steady = np.mean(runs < _SHORTER_HOLD * hold) < _FEW_SHORTER
+    is_free = np.mean(jumps > _LARGER_STEP * jumps.min()) > _MANY_LARGER
+    if hold < 2 or not (is_steady and is_free):
+        return signal
+    sent = np.maximum(np.rint(runs / hold), 1.0).astype(np.intp)
+    again = np.arange(sent.sum()) - np.repeat(np.cumsum(sent) - sent, sent)
+    fresh = np.repeat(changes[:-1], sent) + np.rint(again * np.repeat(runs / sent, sent)).astype(
+        np.intp
+    )
+    fresh = np.append(fresh, changes[-1])
+    if fresh.size < StampedSignal.FEWEST:
+        return signal
+    return StampedSignal(signal.time[fresh], signal.value[fresh])
+
+
+_IRREGULAR_GAP = 3.0
+_REGULAR_SHARE = 0.8
+_EVEN_STEP = 0.5
+"""Conditions of a signal that is sent on change. Its longest pause exceeds `_IRREGULAR_GAP` usual
+pauses, at most `_REGULAR_SHARE` of its pauses are about as short as the shortest, and its steps are
+hardly ever smaller than `_EVEN_STEP` of the usual step. Lost samples leave the other pauses equal;
+a sensor that samples at its own rate has steps of any size."""
+
+_JUMP = 2.0
+"""Dead bands beyond which a change after a pause is a jump: slower ones are sent as they occur."""
+
+
+def as_sent_on_change(signal: StampedSignal) -> StampedSignal:
+    """Hold each value of a signal that is sent on change until just before the next jump.
+
+    A source with a dead band is silent while its value hardly changes. A straight line over such a
+    pause would move a stem that sticks while the force on it grows. Other signals are returned
+    unchanged.
+    """
+    pauses, steps = np.diff(signal.time), np.abs(np.diff(signal.value))
+    usual = float(np.median(pauses))
+    if steps.size < _FEWEST_CHANGES or pauses.max() < _IRREGULAR_GAP * usual:
+        return signal
+    shortest = float(np.quantile(pauses, _FEW_SHORTER))
+    soon = steps[pauses < 0.5 * pauses.max()]
+    least = float(np.quantile(soon, 0.05))
+    is_regular = np.mean(pauses < 1.5 * shortest) > _REGULAR_SHARE
+    if is_regular or least < _EVEN_STEP * float(np.median(steps)):
+        return signal
+    jumps = np.flatnonzero((steps > _JUMP * least) & (pauses > 2.0 * shortest)) + 1
+    return StampedSignal(
+        np.insert(signal.time, jumps, signal.time[jumps] - shortest),
+        np.insert(signal.value, jumps, signal.value[jumps - 1]),
+    )
+
+
+_ROUNDING = 1e-7
+_ON_LINE, _OFF_LINE = 0.51, 5.0
+_FEWEST_RUNS, _LEAST_INSIDE = 20, 0.15
+LARGEST_DEAD_BAND = 0.1
+"""Conditions of a signal that is interpolated between stored values.
+
+Values are rounded to the least difference between two of them, of at least `_ROUNDING` of their
+range. A sample lies on the line between its neighbours if it is within `_ON_LINE` of that step; the
+others are typically `_OFF_LINE` steps and more away from it, which noise of a coarse converter is
+not. At least `_FEWEST_RUNS` runs of samples lie on lines, with the share `_LEAST_INSIDE` of all
+samples that change. A change by more than `LARGEST_DEAD_BAND` of the range in a run is a move."""
+
+
+def as_archived(signal: StampedSignal) -> StampedSignal:
+    """Hold each stored value of a signal that a historian has interpolated, up to the next one.
+
+    Historians store a value only if it has left a dead band, or a corridor about a line, and draw
+    lines between the stored values. Such a line has no noise, and it moves a stem that rests.
+    Other signals are returned unchanged.
+    """
+    time, value = signal.time, signal.value
+    steps = np.diff(np.unique(value))
+    steps = steps[steps > _ROUNDING * np.sum(steps)]
+    if value.size < 3 * _FEWEST_RUNS or not steps.size:
+        return signal
+    step = float(steps.min())
+    share = (time[2:] - time[1:-1]) / (time[2:] - time[:-2])
+    off = np.abs(value[1:-1] - share * value[:-2] - (1.0 - share) * value[2:])
+    stored = np.concatenate([[True], off > _ON_LINE * step, [True]])
+    first, last = np.flatnonzero(stored)[:-1], np.flatnonzero(stored)[1:]
+    run = np.repeat(np.arange(first.size), last - first)
+    change = value[last] - value[first]
+    slope = change / (time[last] - time[first])
+    line = value[first][run] + slope[run] * (time[:-1] - time[first][run])
+    apart = np.maximum.reduceat(np.abs(value[:-1] - line), first)
+    is_line = (last - first > 1) & (apart <= 2.0 * _ON_LINE * step) & (np.abs(change) > step)
+    is_still = (last - first > 1) & (np.abs(change) <= step)
+    inside, still = (float(np.sum((last - first)[which])) for which in (is_line, is_still))
+    if (
+        np.count_nonzero(is_line) < _FEWEST_RUNS
+        or inside < _LEAST_INSIDE * (value.size - still)
+        or float(np.median(off[stored[1:-1]])) < _OFF_LINE * step
+    ):
+        return signal
+    held = (is_line & (np.abs(change) <= LARGEST_DEAD_BAND * np.ptp(value)))[run]
+    found = value.copy()
+    found[:-1][held] = value[first][run][held]
+    return StampedSignal(time, found)
+
+
+_LEAST_HOLD, _LEAST_HELD = 3, 0.3
+_BETWEEN, _SMALLEST = 2, 0.1
+"""Samples in a row, and share of the record, in which a historian has held values; how many runs
+later the next hold follows, unless the signal moves; and the quantile of the changes that is taken,
+since no change is smaller than a dead band."""
+
+
+def dead_band(signal: StampedSignal) -> float:
+    """Estimate the dead band of a historian, in the signal's unit; 0 for one that is not held.
+
+    It is the smallest usual change from a hold, to the next value or to the next hold. Larger
+    changes than `LARGEST_DEAD_BAND` are moves.
+    """
+    value = signal.value
+    first = np.flatnonzero(np.diff(value, prepend=np.nan))
+    length = np.diff(first, append=value.size)
+    holds = np.flatnonzero(length >= _LEAST_HOLD)
+    held, later = holds[:-1], holds[1:]
+    further = value[first[np.stack([held + 1, later])]] - value[first[held]]
+    changes = np.abs(further).max(axis=0)[later - held <= _BETWEEN]
+    changes = changes[changes <= LARGEST_DEAD_BAND * np.ptp(value)]
+    if changes.size < _FEWEST_RUNS or np.sum(length[holds]) < _LEAST_HELD * value.size:
+        return 0.0
+    return float(np.quantile(changes, _SMALLEST))
