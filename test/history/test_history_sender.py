@@ -262,18 +262,13 @@ class TestFaults:
         with sending(history, database) as sender:
             wait_until_sent(sender)
             postgres.do(
-                database_of(database),
-                "ALTER TABLE identification ADD CHECK (method != 'best')",
+                database_of(database), "ALTER TABLE identification ADD CHECK (method != 'best')"
             )
             for number, method in enumerate(("bench", "best", "plant"), 1):
                 history.add(success(START + number, method=method))
             wait_until_sent(sender)
             wait_until(lambda: sender.state.count.refused == 1)
-        assert [one.method for one in History(database).entries()] == [
-            "bench",
-            "bench",
-            "plant",
-        ]
+        assert [one.method for one in History(database).entries()] == ["bench", "bench", "plant"]
 
     def test_a_file_that_is_removed_begins_anew(self, history, database):
         history.add(success())

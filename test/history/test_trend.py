@@ -325,11 +325,7 @@ def test_a_success(monitor):
     entry = entry_of(monitor, VALVE, snapshot, monitor.settings, START)
     assert entry.parameters == dict(result.parameters)
     assert entry.span == (0, 499 * PERIOD)
-    assert entry.fit == (
-        result.fit,
-        result.rms,
-        result.misfit.systematic,
-    )
+    assert entry.fit == (result.fit, result.rms, result.misfit.systematic)
     assert entry.diagnosis == monitor.diagnosis()
     assert entry.diagnosis.ratio.value == 1.0
     assert (entry.baseline, entry.limits) == (baseline, monitor.settings.limits)

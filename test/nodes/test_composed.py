@@ -57,12 +57,7 @@ EXECUTORS = {
     "multi": MultiThreadedExecutor,
     "events": EventsExecutor,
 }
-STATED = {
-    "clock_tolerance": 0.0,
-    "input_timeout": 600.0,
-    "history_file": "",
-    **vars(BENCH_VALVE),
-}
+STATED = {"clock_tolerance": 0.0, "input_timeout": 600.0, "history_file": "", **vars(BENCH_VALVE)}
 
 
 def overrides(**changes):

@@ -94,10 +94,7 @@ BAD_INPUTS = {  # what is published, how many samples of it are taken, words of 
     "pressure too high": (bad_pressure(260e3), 999, *OUTSIDE),
     "apart in time": (apart, 1000, "do not overlap", "3.6e+03 s later"),
 }
-GAPS = {
-    "gap": (gap, 850),
-    "gap of stem": (gap_of_stem, 925),
-}
+GAPS = {"gap": (gap, 850), "gap of stem": (gap_of_stem, 925)}
 
 
 def identifies_the_next_record(client):

@@ -42,9 +42,7 @@ from records import quick_record, simulated
 from sensor_msgs.msg import FluidPressure, JointState
 from std_srvs.srv import Trigger
 
-from valve_friction_ros.health import (
-    RefusedRecordError,
-)
+from valve_friction_ros.health import RefusedRecordError
 from valve_friction_ros.health.measured import Measured
 from valve_friction_ros.identification import RefusalError, published_estimate
 from valve_friction_ros.model import BENCH_VALVE, Recording, SineWave, compiled
@@ -277,10 +275,7 @@ def hears_no_watchdog(client, systemd):
 def stuck(live, tmp_path, systemd):
     """Identifiers of two valves whose loop a file stops."""
     process = live.start(
-        "identifiers",
-        {"valves": "[fv_101, fv_102]"},
-        script=faulty("stuck"),
-        namespace=None,
+        "identifiers", {"valves": "[fv_101, fv_102]"}, script=faulty("stuck"), namespace=None
     )
     wait_to_hear(live.client, systemd, "READY=1")
     return process, tmp_path / BLOCK

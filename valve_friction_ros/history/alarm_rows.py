@@ -197,10 +197,7 @@ def request_alarms(
 
 
 def request_many(
-    history: History,
-    asked: Sequence[tuple[KeptValve, AlarmKind]],
-    request: AlarmRequest,
-    time: int,
+    history: History, asked: Sequence[tuple[KeptValve, AlarmKind]], request: AlarmRequest, time: int
 ) -> int:
     """Store a person's request to many alarms in one transaction; return the number of events.
 

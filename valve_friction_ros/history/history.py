@@ -22,12 +22,7 @@ from valve_friction_ros.health.measured import DatedNumber
 from valve_friction_ros.health.valve_diagnosis import KnownNumbers
 from valve_friction_ros.history import tables
 from valve_friction_ros.history.database import is_ready, marked, reading, writing
-from valve_friction_ros.history.entry import (
-    HistoryEntry,
-    KeptBaseline,
-    KeptValve,
-    friction_point,
-)
+from valve_friction_ros.history.entry import HistoryEntry, KeptBaseline, KeptValve, friction_point
 from valve_friction_ros.history.place import HistoryServer, Place
 from valve_friction_ros.history.rows import (
     entries_in,

@@ -41,13 +41,7 @@ from valve_friction_ros.history.copying import (
     storage_order,
     write_rows,
 )
-from valve_friction_ros.history.database import (
-    marked,
-    reading,
-    server_engine,
-    set_mark,
-    writing,
-)
+from valve_friction_ros.history.database import marked, reading, server_engine, set_mark, writing
 from valve_friction_ros.history.entry import KeptValve
 from valve_friction_ros.history.place import (
     Claim,

@@ -511,10 +511,7 @@ def _stated(row: RowMapping, what: str) -> tuple[Level, StatusSignal, FrictionSt
     return Level(row[f"{what}_level"]), signal, _state(row[f"{what}_state"])
 
 
-_FORMER_STATES = {
-    "PERHAPS_GROWN": FrictionState.UNCLEAR,
-    "PERHAPS_FALLEN": FrictionState.UNCLEAR,
-}
+_FORMER_STATES = {"PERHAPS_GROWN": FrictionState.UNCLEAR, "PERHAPS_FALLEN": FrictionState.UNCLEAR}
 """States of a friction in versions 8 and earlier, and their present states."""
 
 

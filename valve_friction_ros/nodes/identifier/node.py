@@ -185,10 +185,7 @@ class Identifier(ManagedNode):
     """
 
     def __init__(
-        self,
-        workers: Workers | None = None,
-        namespace: str | None = None,
-        **named: Any,
+        self, workers: Workers | None = None, namespace: str | None = None, **named: Any
     ) -> None:
         super().__init__("identifier", namespace=namespace, **named)
         with self.removed_if_refused():

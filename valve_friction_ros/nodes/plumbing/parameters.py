@@ -172,9 +172,7 @@ def values_of(
 
 
 def reject_invalid(
-    node: Node,
-    settings: Iterable[Setting],
-    build: Callable[[Mapping[str, Any]], object],
+    node: Node, settings: Iterable[Setting], build: Callable[[Mapping[str, Any]], object]
 ) -> None:
     """Make `node` reject changes for which `build`, called with all values, raises ValueError."""
     watched = tuple(settings)
