@@ -254,15 +254,12 @@ class AlarmFeed:
         query = (
             sa.select(_EVENT, tables.valve.c.name)
             .select_from(joined(_EVENT, tables.valve))
-            .where(_EVENT.c.id > (self._last or 0))
             .order_by(_EVENT.c.id)
         )
         with reading(self._path) as connection:
             if self._last is None:
                 self._last = int(connection.scalar(newest) or 0)
-                rows: Sequence[RowMapping] = ()
-            else:
-                rows = connection.execute(query).mappings().all()
+            rows = connection.execute(query.where(_EVENT.c.id > self._last)).mappings().all()
         with self._lock:
             for row in rows:
                 alarm = _event(row).alarm
