@@ -361,10 +361,6 @@ class HistoryWriter:
         with self._failures_remembered():
             await self._written(lambda file: file.set_baseline(self.valve, kept))
 
-    def keep_told_level(self, level: Level) -> None:
-        """Queue the level reported last for storage."""
-        self.keep_soon(lambda file: database.keep_told_level(file, self.valve, level))
-
     def alarm_news(self) -> dict[AlarmKind, Alarm]:
         """Return the alarms of the valve changed in the file, also by another process."""
         if self._file is None:
