@@ -49,7 +49,7 @@ from valve_friction_ros.history.place import file_state
 from valve_friction_ros.history.rows import oldest_kept, valve_id
 from valve_friction_ros.history.tables import joined, put
 from valve_friction_ros.outside_text import csv_text
-from valve_friction_ros.streams import END_OF_TIME, utc
+from valve_friction_ros.streams import END_OF_TIME, utc_second
 
 _EVENT = tables.alarm_event
 
@@ -407,4 +407,4 @@ def alarms_as_csv(events: Iterable[KeptAlarmEvent]) -> str:
 
 
 def _iso(time: int | None) -> str:
-    return "" if time is None else f"{utc(time):%Y-%m-%dT%H:%M:%S}Z"
+    return "" if time is None else utc_second(time)

@@ -223,10 +223,7 @@ alarm_recording = _table(
     sa.CheckConstraint("level BETWEEN 0 AND 2"),
 )
 told_level = _table(
-    "told_level",
-    _valve(key=True),
-    *_integers("level"),
-    sa.CheckConstraint("level BETWEEN 0 AND 2"),
+    "told_level", _valve(key=True), *_integers("level"), sa.CheckConstraint("level BETWEEN 0 AND 2")
 )
 """The last notified level of each valve."""
 
