@@ -176,8 +176,7 @@ class HistoryWriter:
     def __init__(
         self, node: Node, monitor: FrictionMonitor, tag: str, writer: HistoryThread
     ) -> None:
-        self._node = node
-        self._monitor = monitor
+        self._node, self._monitor, self._writer = node, monitor, writer
         self.valve = KeptValve(node.get_fully_qualified_name(), tag)
         self._file = _file_of(node)
         self._claim = None if self._file is None else Claim(self._file.path, self.valve.name)
@@ -185,7 +184,6 @@ class HistoryWriter:
         self._known: tuple[int, int] | None = None
         self._sender = _sender_of(node, self._file)
         self._untaken: str | None = None
-        self._writer = writer
         self._waiting = WaitingChanges()
         self._problem: str | None = None
         self.trend: Trend | None = None
