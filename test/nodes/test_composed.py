@@ -407,9 +407,8 @@ def test_each_valve_has_its_own(client):
     expected = identify(record, BENCH_VALVE).values["coulomb_friction"]
     assert client.friction("coulomb_friction") == {"coulomb_friction": expected}
 
-    response = client.call(Trigger, f"{OTHER}/identifier/identify", Trigger.Request())
-    assert not response.success
-    assert "no samples of actuator_pressure" in response.message
+    refusal = client.refusal("identify", f"{OTHER}/identifier")
+    assert "no samples of actuator_pressure" in refusal
     assert client.parameters(f"{OTHER}/identifier", "window", "valve_tag") == [5.0, "FV-102"]
     assert client.parameters(f"{NAMESPACE}/identifier", "window") == [60.0]
     assert client.parameters("/identifiers", "valves") == [["fv_101", "fv_102"]]
