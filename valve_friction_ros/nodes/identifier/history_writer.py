@@ -421,8 +421,13 @@ class HistoryWriter:
         if self._file is None:
             return
         self._waiting.add(change, identification)
-        job = (self._file, time.monotonic(), self._trend_job())
-        self.trend = await done_in(self._writer, self._write, *job)
+        file, asked, trend = self._file, time.monotonic(), self._trend_job()
+
+        def write() -> Trend | None:
+            self._write_waiting(file, asked)
+            return trend(file, self.valve.name)
+
+        self.trend = await done_in(self._writer, write)
 
     @contextlib.contextmanager
     def _failures_remembered(self) -> Iterator[None]:
@@ -439,14 +444,8 @@ class HistoryWriter:
         except (HistoryError, InternalError) as error:
             self._complain(error)
 
-    def _write(
-        self, file: "HistoryFile", asked: float, trend: Callable[["HistoryFile", str], Trend | None]
-    ) -> Trend | None:
-        """Write all waiting changes, requested at `asked` (s, monotonic); return the trend."""
-        self._write_waiting(file, asked)
-        return trend(file, self.valve.name)
-
     def _write_waiting(self, file: "HistoryFile", asked: float) -> None:
+        """Write all waiting changes, requested at `asked`, s of a monotonic clock."""
         if self._waiting.first() is None:
             return
         with self._writer.writing(file.path, asked):
