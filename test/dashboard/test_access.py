@@ -28,12 +28,14 @@ from valve_friction_ros.dashboard.accounts import (
     VARIABLE,
     Access,
     Account,
+    AttemptLimit,
     HashedPassword,
+    LogIn,
     Role,
+    Sessions,
     accounts_from,
 )
 from valve_friction_ros.dashboard.gate import host_of, is_own_origin, own_path
-from valve_friction_ros.dashboard.log_in import AttemptLimit, LogIn, Sessions
 
 
 def test_a_new_hash_is_the_documented_scrypt():
@@ -396,18 +398,14 @@ def test_sessions_survive_a_restart_unless_the_account_has_changed(tmp_path):
 
 @pytest.mark.parametrize("text", ["", "{", "[]", "3", '{"a": 1}', '{"a": ["b"]}'])
 def test_a_damaged_file_of_sessions_is_begun_anew(tmp_path, text):
-    file = tmp_path / "sessions.json"
-    file.write_text(text)
-    file.chmod(0o600)
+    file = write(tmp_path / "sessions.json", text)
     token = Sessions([ANNA], 60.0, Clock(), file).begin(ANNA)
     assert Sessions([ANNA], 60.0, Clock(), file).account_of(token) is ANNA
     assert len(json.loads(file.read_text())) == 1
 
 
 def test_a_file_of_sessions_that_others_can_read_is_refused(tmp_path):
-    file = tmp_path / "sessions.json"
-    file.write_text("{}")
-    file.chmod(0o644)
+    file = write(tmp_path / "sessions.json", "{}", 0o644)
     with pytest.raises(ValueError, match="open to others"):
         Sessions([ANNA], 60.0, Clock(), file)
 

@@ -31,8 +31,7 @@ from local_server import certificate_pair, free_port
 from processes import PATIENCE, wait_until
 from quick_accounts import PASSWORD, quick_account
 
-from valve_friction_ros.dashboard.accounts import VARIABLE, Access, Role
-from valve_friction_ros.dashboard.log_in import Sessions
+from valve_friction_ros.dashboard.accounts import VARIABLE, Access, Role, Sessions
 
 pytest.importorskip("httpx", reason="run `make venv-dashboard`")
 pytest.importorskip("nicegui", reason="run `make venv-dashboard`")

@@ -195,8 +195,7 @@ def test_a_first_survey_ranks_by_the_dead_band_and_says_what_to_do(tmp_path, cap
     """The dead band (F_c + F_s)/k over the travel is 5, 15 and 27 %, the limits are 10 and 20."""
     frictions = {"FV-101": 150.0, "FV-102": 800.0, "FV-103": 450.0}
     make_plant(
-        tmp_path,
-        {f"{tag}.csv": german(QUARTERS[0], *stroke(f, 1)) for tag, f in frictions.items()},
+        tmp_path, {f"{tag}.csv": german(QUARTERS[0], *stroke(f, 1)) for tag, f in frictions.items()}
     )
     assert identify(tmp_path, *BERLIN) == 0
     out = capsys.readouterr().out
@@ -496,8 +495,7 @@ class TestSeizedStem:
         held += np.random.default_rng(2).normal(0.0, 2e-6, held.size)
         stems = enumerate((position, held))
         make_plant(
-            folder,
-            {f"FV-101 {k}.csv": german(QUARTERS[k], pressure, stem) for k, stem in stems},
+            folder, {f"FV-101 {k}.csv": german(QUARTERS[k], pressure, stem) for k, stem in stems}
         )
         words = (
             "--history", folder / "history.sqlite", "--first-is-baseline",

@@ -34,13 +34,7 @@ from histories import (
 from hypothesis import given
 from hypothesis import strategies as st
 
-from valve_friction_ros.health import (
-    Baseline,
-    DatedNumber,
-    Level,
-    Measured,
-    MonitorSettings,
-)
+from valve_friction_ros.health import Baseline, DatedNumber, Level, Measured, MonitorSettings
 from valve_friction_ros.history import (
     HistoryError,
     HistoryFile,
@@ -295,11 +289,7 @@ def test_points_are_those_of_the_entries(history):
     entries = [
         success(START + k, 150.0 + k, 1.0 + k, verdict=verdict) for k, verdict in enumerate(Verdict)
     ]
-    others = (
-        refused(START + 9),
-        success(START, valve=OTHER),
-        success(START, method="signature"),
-    )
+    others = (refused(START + 9), success(START, valve=OTHER), success(START, method="signature"))
     for entry in (*entries, *others):
         history.add(entry)
     expected = [point for one in entries if (point := one.point()) is not None]

@@ -108,7 +108,6 @@ def test_what_changes_and_what_goes_follows(history, database):
         assert server.valves() == (retagged,)
         assert read_told_level(server, VALVE.name) is Level.OK
         assert len(read_moves(server, VALVE.name, BUILT)) == 2
-        assert read_answers(server, VALVE.name)[0].dead_time in (0.25, 0.5)
         assert {one.dead_time for one in read_answers(server, VALVE.name)} >= {0.5}
         keep_renewal(history, VALVE, START + DAY)
         wait_until_sent(sender)
@@ -208,9 +207,7 @@ class TestFaults:
             writer.join()
         assert max(slowest) < 3.0  # the patience of a writer: it waits for no server
         assert len(history.entries()) == len(written)
-        assert [repr(one) for one in History(database).entries()] == [
-            repr(one) for one in history.entries()
-        ]
+        assert all_of(History(database)) == all_of(history)
 
     def test_a_sender_that_is_killed(self, history, database):
         """At any instant, also between the server's commit and what the file notes of it."""
@@ -262,18 +259,13 @@ class TestFaults:
         with sending(history, database) as sender:
             wait_until_sent(sender)
             postgres.do(
-                database_of(database),
-                "ALTER TABLE identification ADD CHECK (method != 'best')",
+                database_of(database), "ALTER TABLE identification ADD CHECK (method != 'best')"
             )
             for number, method in enumerate(("bench", "best", "plant"), 1):
                 history.add(success(START + number, method=method))
             wait_until_sent(sender)
             wait_until(lambda: sender.state.count.refused == 1)
-        assert [one.method for one in History(database).entries()] == [
-            "bench",
-            "bench",
-            "plant",
-        ]
+        assert [one.method for one in History(database).entries()] == ["bench", "bench", "plant"]
 
     def test_a_file_that_is_removed_begins_anew(self, history, database):
         history.add(success())

@@ -86,15 +86,6 @@ def test_the_interval_covers_the_drift(name, drift):
     assert drift or covered == sum(not trend.is_significant for trend in trends)
 
 
-def test_five_exact_looking_estimates_that_scatter_give_no_confidence():
-    """0.8 N a day, and 16.4 N² of residual with three degrees of freedom."""
-    values = [150.0, 154.0, 151.0, 156.0, 153.0]
-    trend = trend_of([DatedNumber(NOON + k * DAY, value, 1e-3) for k, value in enumerate(values)])
-    assert not trend.is_significant
-    assert trend.drift == pytest.approx(0.8 * MONTH / DAY, rel=1e-6)
-    assert trend.line.scatter == pytest.approx(math.sqrt(16.4 / 3), rel=1e-6)
-
-
 def test_a_straight_drift():
     trend = trend_of(straight(3.0))
     assert trend.drift == pytest.approx(3.0)
@@ -325,11 +316,7 @@ def test_a_success(monitor):
     entry = entry_of(monitor, VALVE, snapshot, monitor.settings, START)
     assert entry.parameters == dict(result.parameters)
     assert entry.span == (0, 499 * PERIOD)
-    assert entry.fit == (
-        result.fit,
-        result.rms,
-        result.misfit.systematic,
-    )
+    assert entry.fit == (result.fit, result.rms, result.misfit.systematic)
     assert entry.diagnosis == monitor.diagnosis()
     assert entry.diagnosis.ratio.value == 1.0
     assert (entry.baseline, entry.limits) == (baseline, monitor.settings.limits)

@@ -263,10 +263,6 @@ ROWS = 25
 """What a living writer writes, and a killed one at least."""
 
 
-def start(path, number, rows=()):
-    return writer("history", path, number, *rows)
-
-
 def finished_before_the_kill(process):
     """Kill a writer that is in the midst of it; the number of rows that it said to be finished."""
     for _ in range(ROWS // 2 + process.number):
@@ -282,7 +278,8 @@ def test_no_finished_row_is_lost_and_nothing_is_corrupted(tmp_path):
     history = HistoryFile(tmp_path / "history.sqlite")
     processes = []
     for number in range(KILLED + LIVING):
-        processes.append(start(history.path, number, [ROWS] if number >= KILLED else []))
+        rows = [ROWS] if number >= KILLED else []
+        processes.append(writer("history", history.path, number, *rows))
         processes[-1].number = number
     try:
         finished = [finished_before_the_kill(process) for process in processes[:KILLED]]

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import full_history
 import pytest
-from full_history import BUILT, service_move
+from full_history import BUILT, service_move, usage
 from histories import DAY, OTHER, SECOND, START, VALVE, change, select, success
 
 from valve_friction_ros.evidence import FrictionChange
@@ -45,7 +45,7 @@ from valve_friction_ros.history import (
 )
 from valve_friction_ros.model import Valve
 from valve_friction_ros.response import summarised
-from valve_friction_ros.usage import BINS, Usage, UsedDay
+from valve_friction_ros.usage import Usage, UsedDay
 
 TRAVEL = 0.02
 
@@ -218,10 +218,6 @@ def test_a_machine_without_a_diaphragm(history):
 
 
 TODAY = START // DAY
-
-
-def usage(distance, reversals=4, breakaways=2, hours=1):
-    return Usage(distance, reversals, breakaways, (hours * 3600 * 10**9, *[0] * (BINS - 1)))
 
 
 def test_a_day_is_kept_as_often_as_one_likes(history):

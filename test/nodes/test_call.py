@@ -86,7 +86,9 @@ def test_all_services(bench, call):
     assert out.startswith("baseline: Coulomb friction ")
     code, out, err = call(NAMESPACE, "save")
     assert (code, err) == (0, "")
-    assert Path(out.strip()).exists()
+    saved = Path(out.strip())
+    assert saved.parent == bench.folder / "valve_friction_ros" / "saved"  # ROS_HOME is the folder
+    assert saved.exists()
 
     message = client.identified(quick_record(HIGH_FRICTION))
     assert call(NAMESPACE, "identify") == (0, f"ERROR: {message}\n", "")

@@ -57,12 +57,7 @@ EXECUTORS = {
     "multi": MultiThreadedExecutor,
     "events": EventsExecutor,
 }
-STATED = {
-    "clock_tolerance": 0.0,
-    "input_timeout": 600.0,
-    "history_file": "",
-    **vars(BENCH_VALVE),
-}
+STATED = {"clock_tolerance": 0.0, "input_timeout": 600.0, "history_file": "", **vars(BENCH_VALVE)}
 
 
 def overrides(**changes):
@@ -412,9 +407,8 @@ def test_each_valve_has_its_own(client):
     expected = identify(record, BENCH_VALVE).values["coulomb_friction"]
     assert client.friction("coulomb_friction") == {"coulomb_friction": expected}
 
-    response = client.call(Trigger, f"{OTHER}/identifier/identify", Trigger.Request())
-    assert not response.success
-    assert "no samples of actuator_pressure" in response.message
+    refusal = client.refusal("identify", f"{OTHER}/identifier")
+    assert "no samples of actuator_pressure" in refusal
     assert client.parameters(f"{OTHER}/identifier", "window", "valve_tag") == [5.0, "FV-102"]
     assert client.parameters(f"{NAMESPACE}/identifier", "window") == [60.0]
     assert client.parameters("/identifiers", "valves") == [["fv_101", "fv_102"]]
@@ -471,18 +465,8 @@ def test_a_valve_of_a_plant_takes_little_of_the_graph(live):
     published, heard, services = endpoints(client.node, NAMESPACE)
     assert published == {"/diagnostics", "/rosout"}
     assert heard == {f"{NAMESPACE}/actuator_pressure", f"{NAMESPACE}/stem_state"}
-    assert services == {
-        f"{NAMESPACE}/identifier/{name}"
-        for name in (
-            "identify",
-            "set_baseline",
-            "restore_baseline",
-            "save",
-            "report",
-            "clear",
-            "reset_usage",
-        )
-    }
+    own = ("identify", "set_baseline", "restore_baseline", "save", "report", "clear", "reset_usage")
+    assert services == {f"{NAMESPACE}/identifier/{name}" for name in own}
     assert len(published) + len(heard) + 2 * len(services) <= 20
 
     told = client.listen(DiagnosticStatus, f"{NAMESPACE}/identifier/estimate")

@@ -46,6 +46,7 @@ TAG = "<img src=x onerror=alert(1)>"
 VALVE = f"/valve?node={quote(NODE)}"
 SILENCE = 8.0
 """Long enough for a slow machine."""
+EXCESS = Condition(Level.ERROR, StatusSignal.FAILURE, "excess friction")
 PLANT = Path(__file__).parents[1] / "support" / "simulated_plant.py"
 
 
@@ -456,10 +457,9 @@ MANY = 200
 @pytest.fixture(scope="module")
 def many(plant):
     """Alarms of two hundred valves in the history."""
-    shown = Condition(Level.ERROR, StatusSignal.FAILURE, "excess friction")
     for number in range(MANY):
         valve = KeptValve(f"/many/fv_{number}/identifier", f"MANY-{number}")
-        follow_alarms(plant.history, valve, {AlarmKind.FRICTION_HIGH: shown}, time.time_ns())
+        follow_alarms(plant.history, valve, {AlarmKind.FRICTION_HIGH: EXCESS}, time.time_ns())
 
 
 @pytest.mark.usefixtures("many")
@@ -486,9 +486,8 @@ def test_of_many_those_near_the_view_are_drawn(tab, path, line):
 def test_an_alarm_of_a_valve_without_alarm_services_is_answered(plant, tab):
     """An identifier beside twenty others offers none; it follows the file of the history."""
     node = "/crowd/fv_1/identifier"
-    shown = Condition(Level.ERROR, StatusSignal.FAILURE, "excess friction")
     valve = KeptValve(node, "CROWD-1")
-    follow_alarms(plant.history, valve, {AlarmKind.FRICTION_HIGH: shown}, time.time_ns())
+    follow_alarms(plant.history, valve, {AlarmKind.FRICTION_HIGH: EXCESS}, time.time_ns())
     page = tab.open("/alarms?area=/crowd")
     row = page.locator("tr", has_text="friction high")
     row.get_by_role("button", name="Acknowledge").click()
@@ -558,10 +557,9 @@ def test_ctrl_c_ends_it_and_open_pages_heal_when_it_is_back(plant, tab):
 
 def test_a_click_means_the_alarm_under_it_when_another_has_just_come(plant, tab):
     """The server is ahead of the rows in the browser, which here get no news."""
-    shown = Condition(Level.ERROR, StatusSignal.FAILURE, "excess friction")
     for number in (1, 2):
         valve = KeptValve(f"/late/fv_{number}/identifier", f"LATE-{number}")
-        follow_alarms(plant.history, valve, {AlarmKind.STUCK: shown}, time.time_ns())
+        follow_alarms(plant.history, valve, {AlarmKind.STUCK: EXCESS}, time.time_ns())
         if number == 1:
             page = tab.open("/alarms?area=/late")
             row = page.locator("tr", has_text="LATE-1")

@@ -75,10 +75,7 @@ def test_a_link_that_comes_later_is_not_followed(tmp_path):
     kept = OutputFolder(str(tmp_path / "plant" / "pages"), "reports", "a report")
     (tmp_path / "elsewhere" / "pages").mkdir(parents=True)
     (tmp_path / "plant").symlink_to("elsewhere")
-    with (
-        pytest.raises(RefusalError, match=r"plant/pages: it has become a link to"),
-        kept.opened(),
-    ):
+    with pytest.raises(RefusalError, match=r"plant/pages: it has become a link to"), kept.opened():
         pytest.fail("the link was followed")
 
 

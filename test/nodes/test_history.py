@@ -171,11 +171,7 @@ def test_only_a_significant_drift_has_keys():
     assert trend_values(trend_of(points, Baseline(141.0))) == {}
     assert trend_values(None) == {}
     rising = [one._replace(value=150.0 + k) for k, one in enumerate(points)]
-    keys = {
-        "friction_drift [N/month]",
-        "friction_drift half width [N/month]",
-        "friction_drift of",
-    }
+    keys = {"friction_drift [N/month]", "friction_drift half width [N/month]", "friction_drift of"}
     assert set(trend_values(trend_of(rising))) == keys
 
 

@@ -169,8 +169,7 @@ def test_the_numbers_are_those_of_the_record(fed):
     client, publisher = fed
     client.empty_the_buffer()
     send(publisher, ROWS)
-    response = client.identify_all(2 * len(RECORD))
-    assert response.success, response.message
+    client.identified_whole(2 * len(RECORD))
     expected = identify(RECORD, BENCH_VALVE)
     assert client.friction("coulomb_friction", "rms") == {
         "coulomb_friction": expected.values["coulomb_friction"],

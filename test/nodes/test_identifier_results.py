@@ -15,16 +15,7 @@ import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
 from histories import as_kept
-from live_nodes import (
-    NAMESPACE,
-    NODE,
-    SECOND,
-    START,
-    STREAM,
-    SimulatedClock,
-    stamp_of,
-    values_of,
-)
+from live_nodes import NAMESPACE, NODE, SECOND, START, STREAM, SimulatedClock, stamp_of, values_of
 from records import bench_record, quick_record
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64

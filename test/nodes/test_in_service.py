@@ -233,8 +233,8 @@ def test_the_newer_of_identification_and_moves_leads_and_is_the_baseline(live, h
     )
     client = live.client_of_identifier(SECURE)
     client.identified(quick_record(packing))
-    answer = client.trigger("set_baseline")
-    assert answer.message.endswith("(by the identification of 2023-11-14 22:13 UTC)")
+    answer = client.success("set_baseline")
+    assert answer.endswith("(by the identification of 2023-11-14 22:13 UTC)")
     assert client.trigger("reset_usage").success  # the strokes of the record are no evidence
     serve(client, 1, 300.0)
     client.status_values(
@@ -270,8 +270,7 @@ def test_a_renewed_packing_a_wrong_stamp_and_another_actuator(live):
         lambda status: "evidence left_out" in values_of(status), "moves left out"
     )
     assert number(left, "moves") >= number(before, "moves")
-    answer = client.trigger("reset_usage")
-    assert "its moves are no longer used as evidence" in answer.message
+    assert "its moves are no longer used as evidence" in client.success("reset_usage")
     renewed = client.status_values(lambda status: number(values_of(status), "moves") == 0, "none")
     assert "evidence reference [N]" not in renewed
     serve(client, MOVES, 450.0)

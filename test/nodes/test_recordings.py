@@ -13,6 +13,7 @@ import contextlib
 import io
 import json
 import math
+import os
 import re
 import time
 from dataclasses import asdict
@@ -24,7 +25,8 @@ import numpy as np
 import pytest
 import yaml
 from faulty_identifier import FINISH, FULL, SLOW, faulty
-from live_nodes import NAMESPACE, NODE, SECOND, STREAM, SimulatedClock, stamp_of, stamps_of
+from live_nodes import NAMESPACE, NODE, PROJECT, SECOND, STREAM, SimulatedClock, stamp_of, stamps_of
+from processes import ran
 from rclpy.duration import Duration
 from records import quick_record
 from rosbags.rosbag2 import Reader
@@ -225,9 +227,8 @@ def test_the_node_goes_on_while_it_saves_and_nobody_on_the_graph_fills_the_disk(
     files = [one for one in folder.rglob("*") if one.is_file()]
     assert sum(one.stat().st_size for one in files) <= 100_000
     assert len(list(folder.iterdir())) == sum(one.success for one in answers)
-    page = live.client.trigger("report")  # some 200 kB
-    assert not page.success
-    assert page.message.startswith("no space left: fv_101 uses ")
+    page = live.client.refusal("report")  # some 200 kB
+    assert page.startswith("no space left: fv_101 uses ")
     assert list((tmp_path / "pages").iterdir()) == []
 
 
@@ -236,10 +237,58 @@ def test_an_empty_buffer_is_not_saved(run):
     assert run.client.refusal("save") == "the buffer is empty: there is nothing to save"
 
 
-def test_without_a_folder_it_goes_under_ros_home(live, tmp_path):
-    """The ROS_HOME of a test's nodes is its folder."""
-    live.start_identifier()
-    live.client.send(pressure=(np.array([1, 2]), np.array([1e5, 1e5])))
-    live.client.wait_for_buffered(2)
-    response = live.client.success("save")
-    assert Path(response).parent == tmp_path / "valve_friction_ros" / "saved"
+LIBRARIES = ("apsw", "backports", "lz4", "rosbags")
+LINE = re.compile(
+    r"bags need rosbags, lz4 and backports.zstd \(No module named '\w+'\): "
+    r"run `pip install 'rosbags>=0.11.9,<0.12' lz4 backports.zstd`"
+)
+
+
+class TestWithoutBagLibraries:
+    """All else works, and a bag is refused with the remedy."""
+
+    @pytest.fixture(autouse=True)
+    def without_libraries(self, monkeypatch, tmp_path):
+        """Modules of these names that fail as those that are not there do."""
+        folder = tmp_path / "missing"
+        folder.mkdir()
+        for name in LIBRARIES:
+            text = f"raise ModuleNotFoundError(\"No module named '{name}'\", name='{name}')\n"
+            (folder / f"{name}.py").write_text(text)
+        path = [str(folder), str(PROJECT), os.environ.get("PYTHONPATH")]
+        monkeypatch.setenv("PYTHONPATH", os.pathsep.join(filter(None, path)))
+
+    @pytest.mark.parametrize("name", ["simulator", "pressure_source"])
+    def test_a_node_starts(self, live, name):
+        process = live.start(name)
+        live.client.wait_until(lambda: "ready" in process.errors, "the ready line")
+
+    def test_save_is_refused_and_the_identifier_goes_on(self, live):
+        process = live.start_identifier()
+        live.client.wait_until(lambda: "ready" in process.errors, "the ready line")
+        for _ in range(2):
+            response = live.client.refusal("save")
+            assert LINE.fullmatch(response), response
+
+    def test_csv_is_identified_and_a_bag_is_refused(self, loose_record, bench_yaml, tmp_path):
+        columns = np.c_[loose_record.time, loose_record.pressure, loose_record.position]
+        file = tmp_path / "record.csv"
+        np.savetxt(file, columns, "%.12g", ",", header="time_s,pressure_pa,position_m", comments="")
+        options = ("--valve", bench_yaml, "--method", "published")
+        code, _, error = ran("identify", file, *options, cwd=PROJECT)
+        assert code == 0, error
+        bag = tmp_path / "bag.mcap"
+        bag.write_bytes(b"\x89MCAP0\r\n")
+        code, _, error = ran("identify", bag, *options, cwd=PROJECT)
+        assert code == 2
+        assert LINE.fullmatch(error.strip().removeprefix("valve_friction identify: "))
+
+    def test_a_folder_tells_which_are_bags(self, bench_yaml, tmp_path):
+        folder = tmp_path / "records"
+        folder.mkdir()
+        (folder / "bag.mcap").write_bytes(b"\x89MCAP0\r\n")
+        output = tmp_path / "rows.csv"
+        options = ("--valve", bench_yaml, "--output", output)
+        code, _, error = ran("identify-folder", folder, *options, cwd=PROJECT)
+        assert code == 2, error
+        assert LINE.search(output.read_text())

@@ -52,8 +52,8 @@ def service_move(number):
     return Move(begin, begin + SECOND, 1e-3, 2e-3, 500.0 + number, 10.0, 1e-3, *onset)
 
 
-def usage(distance):
-    return Usage(distance, 4, 2, (3600 * 10**9, *[0] * (BINS - 1)))
+def usage(distance, reversals=4, breakaways=2, hours=1):
+    return Usage(distance, reversals, breakaways, (hours * 3600 * 10**9, *[0] * (BINS - 1)))
 
 
 def fill(history, valve=VALVE):

@@ -29,9 +29,6 @@ if TYPE_CHECKING:
         Unread as Unread,
         view_of as view_of,
     )
-    from valve_friction_ros.dashboard.plant_rows import (
-        Selection as Selection,
-        selected as selected,
-    )
+    from valve_friction_ros.dashboard.plant_rows import Selection as Selection, selected as selected
 else:
     __getattr__ = names_on_demand(__name__)

@@ -27,13 +27,7 @@ from valve_friction_ros.dashboard.history_cache import HistoryCache
 from valve_friction_ros.dashboard.live_state import Plant
 from valve_friction_ros.dashboard.live_strip import LiveStrip
 from valve_friction_ros.health.alarms import AlarmAction, AlarmError, AlarmKind, AlarmRequest
-from valve_friction_ros.history import (
-    HistoryError,
-    KeptValve,
-    Place,
-    request_alarms,
-    request_many,
-)
+from valve_friction_ros.history import HistoryError, KeptValve, Place, request_alarms, request_many
 from valve_friction_ros.outside_text import printable
 from valve_friction_ros.wording import numbered
 

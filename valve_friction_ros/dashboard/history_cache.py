@@ -24,11 +24,7 @@ from statistics import fmean, median
 from typing import TYPE_CHECKING, NamedTuple
 
 from valve_friction_ros import history as database
-from valve_friction_ros.dashboard.live_state import (
-    Plant,
-    Status,
-    Unread,
-)
+from valve_friction_ros.dashboard.live_state import Plant, Status, Unread
 from valve_friction_ros.health.alarms import Alarm, AlarmError, AlarmKind, AlarmState
 from valve_friction_ros.health.levels import Level, StatusSignal, Survey
 from valve_friction_ros.history import (

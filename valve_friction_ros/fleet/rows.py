@@ -13,7 +13,6 @@ import hashlib
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from datetime import datetime, timezone
 from pathlib import Path
 from typing import NamedTuple
 
@@ -28,6 +27,7 @@ from valve_friction_ros.identification.settings import PARAMETER_UNITS
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.records.files import write_whole
 from valve_friction_ros.reports.identified_record import what_to_do
+from valve_friction_ros.streams import utc_second
 
 Cell = str | float | int | None
 
@@ -74,13 +74,6 @@ def _one_line(text: str) -> str:
     return " ".join(text.split())
 
 
-def _began(recording: Recording) -> str | None:
-    if recording.start_time < DATED:
-        return None
-    began = datetime.fromtimestamp(recording.start_time, timezone.utc)
-    return f"{began:%Y-%m-%dT%H:%M:%SZ}"
-
-
 def diagnosis_cells(diagnosis: Diagnosis, findings: Sequence[Finding] = ()) -> dict[str, Cell]:
     """Return the cells of a diagnosis and of the findings beyond friction."""
     told = diagnosis.to_dict()
@@ -123,7 +116,7 @@ def result_cells(
         "sliding_speed_m_per_s": plain(result.sliding_speed),
         "fit": shown["fit"],
         "rms_m": shown["rms"],
-        "began": _began(recording),
+        "began": utc_second(1e9 * began) if (began := recording.start_time) >= DATED else None,
         "samples": len(recording),
         "duration_s": round((len(recording) - 1) * recording.sample_period, 9),
         "warnings": "; ".join(map(_one_line, (*notes, *shown["warnings"]))) or None,

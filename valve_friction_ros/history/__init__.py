@@ -28,10 +28,7 @@ if TYPE_CHECKING:
         request_many as request_many,
         suppression_ends as suppression_ends,
     )
-    from valve_friction_ros.history.copying import (
-        CopiedPart as CopiedPart,
-        copied as copied,
-    )
+    from valve_friction_ros.history.copying import CopiedPart as CopiedPart, copied as copied
     from valve_friction_ros.history.entry import (
         AlarmRecording as AlarmRecording,
         HistoryEntry as HistoryEntry,

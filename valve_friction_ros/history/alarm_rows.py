@@ -49,7 +49,7 @@ from valve_friction_ros.history.place import file_state
 from valve_friction_ros.history.rows import oldest_kept, valve_id
 from valve_friction_ros.history.tables import joined, put
 from valve_friction_ros.outside_text import csv_text
-from valve_friction_ros.streams import END_OF_TIME, utc
+from valve_friction_ros.streams import END_OF_TIME, utc_second
 
 _EVENT = tables.alarm_event
 
@@ -197,10 +197,7 @@ def request_alarms(
 
 
 def request_many(
-    history: History,
-    asked: Sequence[tuple[KeptValve, AlarmKind]],
-    request: AlarmRequest,
-    time: int,
+    history: History, asked: Sequence[tuple[KeptValve, AlarmKind]], request: AlarmRequest, time: int
 ) -> int:
     """Store a person's request to many alarms in one transaction; return the number of events.
 
@@ -257,15 +254,12 @@ class AlarmFeed:
         query = (
             sa.select(_EVENT, tables.valve.c.name)
             .select_from(joined(_EVENT, tables.valve))
-            .where(_EVENT.c.id > (self._last or 0))
             .order_by(_EVENT.c.id)
         )
         with reading(self._path) as connection:
             if self._last is None:
                 self._last = int(connection.scalar(newest) or 0)
-                rows: Sequence[RowMapping] = ()
-            else:
-                rows = connection.execute(query).mappings().all()
+            rows = connection.execute(query.where(_EVENT.c.id > self._last)).mappings().all()
         with self._lock:
             for row in rows:
                 alarm = _event(row).alarm
@@ -413,4 +407,4 @@ def alarms_as_csv(events: Iterable[KeptAlarmEvent]) -> str:
 
 
 def _iso(time: int | None) -> str:
-    return "" if time is None else f"{utc(time):%Y-%m-%dT%H:%M:%S}Z"
+    return "" if time is None else utc_second(time)

@@ -159,8 +159,7 @@ def write_rows(
         return
     (key,) = key_columns(part)
     query = sa.select(part.c.id, part.c.valve_id, key).where(
-        part.c.valve_id.in_({valve for valve, _ in rows}),
-        key.in_([row.key[0] for _, row in rows]),
+        part.c.valve_id.in_({valve for valve, _ in rows}), key.in_([row.key[0] for _, row in rows])
     )
     ids = {(valve, key): number for number, valve, key in connection.execute(query)}
     for child in _CHILDREN[part]:

@@ -22,22 +22,17 @@ from valve_friction_ros.health.measured import DatedNumber
 from valve_friction_ros.health.valve_diagnosis import KnownNumbers
 from valve_friction_ros.history import tables
 from valve_friction_ros.history.database import is_ready, marked, reading, writing
-from valve_friction_ros.history.entry import (
-    HistoryEntry,
-    KeptBaseline,
-    KeptValve,
-    friction_point,
-)
+from valve_friction_ros.history.entry import HistoryEntry, KeptBaseline, KeptValve
 from valve_friction_ros.history.place import HistoryServer, Place
 from valve_friction_ros.history.rows import (
     entries_in,
-    frictions_in,
     insert_baseline,
     insert_entry,
     kept_baseline_in,
     known_numbers_in,
     numbers_in,
     oldest_kept,
+    points_in,
     record_in,
     valve_id,
 )
@@ -78,7 +73,7 @@ class History:
             if row is None or (kept := kept_baseline_in(row)).withdrawn:
                 return None
             number = row["id"]
-            numbers = numbers_in(connection, "baseline", valve, number, number).get(number, {})
+            numbers = numbers_in(connection, "baseline", valve, [number]).get(number, {})
             whole = replace(kept.baseline, numbers=numbers)
             return replace(kept, baseline=whole, record=record_in(connection, number))
 
@@ -131,11 +126,7 @@ class History:
         )
         with reading(self.place) as connection:
             rows = connection.execute(query).mappings().all()
-            points = [
-                friction_point(time, parameters, speed, baseline, numbers)
-                for time, parameters, speed, numbers in frictions_in(connection, valve, rows)
-            ]
-        return tuple(point for point in points if point is not None)
+            return tuple(filter(None, points_in(connection, valve, rows, baseline)))
 
     def valves(self) -> tuple[KeptValve, ...]:
         """Return all valves, sorted by name."""

@@ -41,13 +41,7 @@ from valve_friction_ros.history.copying import (
     storage_order,
     write_rows,
 )
-from valve_friction_ros.history.database import (
-    marked,
-    reading,
-    server_engine,
-    set_mark,
-    writing,
-)
+from valve_friction_ros.history.database import marked, reading, server_engine, set_mark, writing
 from valve_friction_ros.history.entry import KeptValve
 from valve_friction_ros.history.place import (
     Claim,
@@ -164,11 +158,6 @@ def count_unsent(path: Path) -> UnsentCount:
             return _NONE_WAIT
         waiting, since, refused = file.execute(counted.select_from(unsent)).one()
     return UnsentCount(waiting - refused, since, refused)
-
-
-def _has_unsent(file: Connection, valve: int) -> bool:
-    waits = sa.and_(unsent.c.valve_id == valve, unsent.c.part != tables.valve.name)
-    return file.execute(sa.select(unsent.c.number).where(waits).limit(1)).first() is not None
 
 
 # Between file and server
@@ -291,7 +280,8 @@ def _put_into(
     taken = [(one, [*rows_of(there, one, one.c.valve_id == number)]) for one in PARTS]
     with writing(path) as file:
         here = valve_id(file, valve)
-        if is_over() or _has_unsent(file, here):
+        waits = sa.and_(unsent.c.valve_id == here, unsent.c.part != tables.valve.name)
+        if is_over() or file.execute(sa.select(unsent).where(waits).limit(1)).first():
             return False
         for part, rows in taken:
             if part not in KEPT:

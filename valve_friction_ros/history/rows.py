@@ -37,7 +37,7 @@ from valve_friction_ros.health.diagnosis import (
     friction_state,
 )
 from valve_friction_ros.health.levels import Level, StatusSignal
-from valve_friction_ros.health.measured import DIFFERENCES, RATIOS, Measured
+from valve_friction_ros.health.measured import DIFFERENCES, RATIOS, DatedNumber, Measured
 from valve_friction_ros.health.valve_diagnosis import KnownNumbers
 from valve_friction_ros.history import tables
 from valve_friction_ros.history.entry import (
@@ -47,6 +47,7 @@ from valve_friction_ros.history.entry import (
     KeptBaseline,
     KeptValve,
     Span,
+    friction_point,
 )
 from valve_friction_ros.history.tables import joined, put
 from valve_friction_ros.identification.rendering import plain
@@ -290,18 +291,16 @@ def record_in(connection: Connection, baseline: int) -> Recording | None:
 
 
 def numbers_in(
-    connection: Connection, owner: str, valve: str, first: int, last: int, *names: str
+    connection: Connection, owner: str, valve: str, ids: Sequence[int], *names: str
 ) -> dict[int, dict[str, Measured]]:
-    """Return the numbers of a valve's rows `first` to `last` of the table `owner`, by row.
+    """Return the numbers of a valve's rows of the table `owner`, from the lowest to the highest id.
 
     With `names`, only the numbers of these names are read.
     """
     table, owners = _NUMBERS[owner], tables.METADATA.tables[owner]
-    query = (
-        sa.select(table)
-        .select_from(joined(table, owners, tables.valve))
-        .where(tables.valve.c.name == valve, owners.c.id.between(first, last))
-    )
+    span = owners.c.id.between(min(ids, default=0), max(ids, default=0))
+    of_valve = sa.select(table).select_from(joined(table, owners, tables.valve))
+    query = of_valve.where(tables.valve.c.name == valve, span)
     if names:
         query = query.where(table.c.name.in_(names))
     found: defaultdict[int, dict[str, Measured]] = defaultdict(dict)
@@ -395,21 +394,17 @@ def _entry(
     )
 
 
-def frictions_in(
-    connection: Connection, valve: str, rows: Sequence[RowMapping]
-) -> Iterator[tuple[int, dict[str, Parameter], float, Mapping[str, Measured]]]:
-    """Yield what `friction_point` needs of each identification: time, parameters, speed, exponent.
-
-    `rows` are those of the parameters of one valve; the exponent is in a mapping of numbers.
-    """
-    ids = [row["identification_id"] for row in rows] or [0]
-    owner, span = "identification", (min(ids), max(ids))
-    numbers = numbers_in(connection, owner, valve, *span, SPEED_EXPONENT)
+def points_in(
+    connection: Connection, valve: str, rows: Sequence[RowMapping], baseline: Baseline | None
+) -> Iterator[DatedNumber | None]:
+    """Yield `friction_point` of each identification, from the rows of a valve's parameters."""
+    ids = [row["identification_id"] for row in rows]
+    numbers = numbers_in(connection, "identification", valve, ids, SPEED_EXPONENT)
     for key, some in groupby(rows, key=lambda row: row["identification_id"]):
-        several = [*some]
-        parameters = {row["name"]: _parameter(row) for row in several}
-        speed = _number(several[0]["sliding_speed"])
-        yield several[0]["time_ns"], parameters, speed, numbers.get(key, {})
+        first, *others = some
+        parameters = {row["name"]: _parameter(row) for row in (first, *others)}
+        speed, own = _number(first["sliding_speed"]), numbers.get(key, {})
+        yield friction_point(first["time_ns"], parameters, speed, baseline, own)
 
 
 def entries_in(
@@ -446,8 +441,7 @@ def _entries_of_valve(
         .order_by(time, tables.identification.c.id)
     )
     rows = connection.execute(entries).mappings().all()
-    ids = [row["id"] for row in rows] or [0]
-    numbers = numbers_in(connection, "identification", valve, min(ids), max(ids))
+    numbers = numbers_in(connection, "identification", valve, [row["id"] for row in rows])
     for row in rows:
         ordered = sorted(parameters[row["id"]], key=lambda one: _PLACES.get(one.name, len(_PLACES)))
         yield _entry(row, ordered, numbers.get(row["id"], {}))
@@ -511,10 +505,7 @@ def _stated(row: RowMapping, what: str) -> tuple[Level, StatusSignal, FrictionSt
     return Level(row[f"{what}_level"]), signal, _state(row[f"{what}_state"])
 
 
-_FORMER_STATES = {
-    "PERHAPS_GROWN": FrictionState.UNCLEAR,
-    "PERHAPS_FALLEN": FrictionState.UNCLEAR,
-}
+_FORMER_STATES = {"PERHAPS_GROWN": FrictionState.UNCLEAR, "PERHAPS_FALLEN": FrictionState.UNCLEAR}
 """States of a friction in versions 8 and earlier, and their present states."""
 
 

@@ -223,10 +223,7 @@ alarm_recording = _table(
     sa.CheckConstraint("level BETWEEN 0 AND 2"),
 )
 told_level = _table(
-    "told_level",
-    _valve(key=True),
-    *_integers("level"),
-    sa.CheckConstraint("level BETWEEN 0 AND 2"),
+    "told_level", _valve(key=True), *_integers("level"), sa.CheckConstraint("level BETWEEN 0 AND 2")
 )
 """The last notified level of each valve."""
 
@@ -414,21 +411,17 @@ def bring_up_to_date(connection: Connection, version: int) -> None:
     METADATA.create_all(connection)
     if version:
         for table in METADATA.sorted_tables:
-            _add_lacking(connection, table)
+            for column in _lacking(connection, table):
+                definition = CreateColumn(column).compile(dialect=connection.dialect)
+                do(f"ALTER TABLE {table.name} ADD COLUMN {definition}")
+            for index in table.indexes:
+                index.create(connection, checkfirst=True)
         for statement in (one for of, some in _CHANGES.items() if version < of for one in some):
             do(statement)
     else:
         do(f"CREATE UNIQUE INDEX settings_content ON settings ({_CONTENT[database]})")
     if version < 3:
         do(_VIEW.format(time=_TIME[database]))
-
-
-def _add_lacking(connection: Connection, table: sa.Table) -> None:
-    for column in _lacking(connection, table):
-        definition = CreateColumn(column).compile(dialect=connection.dialect)
-        connection.exec_driver_sql(f"ALTER TABLE {table.name} ADD COLUMN {definition}")
-    for index in table.indexes:
-        index.create(connection, checkfirst=True)
 
 
 def _lacking(connection: Connection, table: sa.Table) -> list[sa.Column[Any]]:

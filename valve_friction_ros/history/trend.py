@@ -119,11 +119,7 @@ class ScatteredLine(NamedTuple):
         c = gap**2 - factor * (self.level_error**2 + level_error**2)
         root = math.sqrt(max((self.slope * gap) ** 2 - a * c, 0.0))
         ends = sorted((self.slope * gap + sign * root) / a for sign in (-1.0, 1.0))
-        return (
-            self.centre + gap / self.slope,
-            self.centre + ends[0],
-            self.centre + ends[1],
-        )
+        return (self.centre + gap / self.slope, self.centre + ends[0], self.centre + ends[1])
 
 
 def _misfit(

@@ -262,8 +262,7 @@ def status_of(message: DiagnosticStatus) -> Status:
 
 
 def _quickly(message: bytes) -> Iterator[Unread]:
-    frame, at = _text(message, _AFTER_STAMP)
-    del frame
+    _, at = _text(message, _AFTER_STAMP)
     count, at = _count(message, at)
     for left in range(count - 1, -1, -1):
         name, _ = _text(message, at + 1)

@@ -195,10 +195,7 @@ class TriggerCall:
             self._greeting = set_parameters_request(self._node, self._identifier, self._values)
             return
         self._greeting = PatientRequest(
-            self._node,
-            GetParameters,
-            f"{self._identifier}/get_parameters",
-            GetParameters.Request(),
+            self._node, GetParameters, f"{self._identifier}/get_parameters", GetParameters.Request()
         )
 
     def _is_known(self, waited: float) -> bool:

@@ -24,7 +24,6 @@ from valve_friction_ros.model.valve import KarnoppParameters, Valve
 from valve_friction_ros.nodes.plumbing.messages import stamp_of
 from valve_friction_ros.nodes.plumbing.parameters import (
     declare_parameters,
-    karnopp_parameters_from,
     reject_invalid,
     values_of,
     valve_from,
@@ -34,7 +33,7 @@ from valve_friction_ros.nodes.plumbing.polled_subscription import PolledSubscrip
 from valve_friction_ros.nodes.plumbing.qos import qos_overrides, stream
 from valve_friction_ros.nodes.plumbing.running import run_nodes
 from valve_friction_ros.nodes.plumbing.worker import Readiness, Worker
-from valve_friction_ros.settings import NODES
+from valve_friction_ros.settings import KARNOPP, NODES
 
 _TICK = 1e-3
 _SELDOM = 0.02
@@ -60,8 +59,9 @@ _CHANGEABLE = tuple(one for one in _PARAMETERS if not one.read_only)
 
 def _plant(values: Mapping[str, Any]) -> tuple[Valve, KarnoppParameters, float]:
     """Build the valve, its model and the noise of the position."""
-    valve, parameters = valve_from(values), karnopp_parameters_from(values)
-    return valve, parameters, require_non_negative("position_noise", values["position_noise"])
+    valve, noise = valve_from(values), values["position_noise"]
+    parameters = KarnoppParameters(**{one.name: values[one.name] for one in KARNOPP})
+    return valve, parameters, require_non_negative("position_noise", noise)
 
 
 class Simulator(PacedNode):

@@ -149,11 +149,7 @@ class AlarmSelection:
         """Return the filter of the history at a time, ns since 1970."""
         since = now - RANGES[self.span] if self.span in RANGES else AlarmFilter().since
         return AlarmFilter(
-            since=since,
-            area=self.area,
-            states=self.states,
-            kinds=self.kinds,
-            words=self.search,
+            since=since, area=self.area, states=self.states, kinds=self.kinds, words=self.search
         )
 
 

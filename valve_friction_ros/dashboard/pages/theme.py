@@ -154,9 +154,8 @@ def text(tag: str, words: str, css: str = "") -> ui.element:
 
 def link(words: str, href: str, css: str = "", **attributes: str) -> ui.element:
     """Make a link."""
-    made = text("a", words, css)
-    for name, value in {"href": href, **attributes}.items():
-        made.props[name] = value
+    with element("a", css, href=href, **attributes) as made:
+        ui.label(words)
     return made
 
 

@@ -16,12 +16,7 @@ from urllib.parse import urlencode
 
 from nicegui import run, ui
 
-from valve_friction_ros.dashboard.context import (
-    Answer,
-    DashboardContext,
-    OfferedFile,
-    ValveFiles,
-)
+from valve_friction_ros.dashboard.context import Answer, DashboardContext, OfferedFile, ValveFiles
 from valve_friction_ros.dashboard.live_state import Heard, Quantity, ValveView
 from valve_friction_ros.dashboard.live_strip import LiveStrip
 from valve_friction_ros.dashboard.pages.alarm_page import AlarmStates

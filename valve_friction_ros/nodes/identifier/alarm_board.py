@@ -106,13 +106,8 @@ class AlarmBoard:
         self._on_record = dict(self.alarms)
         if not node.tells_parameters:
             return  # a request needs the parameter alarm_who
-        for name, action in (
-            ("acknowledge", AlarmAction.ACKNOWLEDGE),
-            ("shelve", AlarmAction.SHELVE),
-            ("unshelve", AlarmAction.UNSHELVE),
-            ("comment", AlarmAction.COMMENT),
-        ):
-            create_service(node, f"~/{name}", partial(self._ask, action))
+        for name in ("acknowledge", "shelve", "unshelve", "comment"):
+            create_service(node, f"~/{name}", partial(self._ask, AlarmAction[name.upper()]))
         create_service(node, "~/out_of_service", self._switch, kind=SetBool)
 
     def _condition(self, kind: AlarmKind) -> Condition:

@@ -167,8 +167,8 @@ class Alerts:
 
     def _keep(self, level: Level) -> None:
         if level != self._kept:
-            self._kept = level
-            self._history.keep_told_level(level)
+            self._kept, valve = level, self._history.valve
+            self._history.keep_soon(lambda file: database.keep_told_level(file, valve, level))
 
     def _alert(
         self,

@@ -61,11 +61,8 @@ class BaselineInForce:
         evidence: EvidenceWatch,
         level: Callable[[], Level],
     ) -> None:
-        self._node = node
-        self._monitor = monitor
-        self._history = history
-        self._evidence = evidence
-        self._level = level
+        self._node, self._monitor, self._history = node, monitor, history
+        self._evidence, self._level = evidence, level
 
     def _given(self) -> Baseline | None:
         return baseline_from(self._node.get_parameter(_PARAMETER).value)

@@ -176,8 +176,7 @@ class HistoryWriter:
     def __init__(
         self, node: Node, monitor: FrictionMonitor, tag: str, writer: HistoryThread
     ) -> None:
-        self._node = node
-        self._monitor = monitor
+        self._node, self._monitor, self._writer = node, monitor, writer
         self.valve = KeptValve(node.get_fully_qualified_name(), tag)
         self._file = _file_of(node)
         self._claim = None if self._file is None else Claim(self._file.path, self.valve.name)
@@ -185,7 +184,6 @@ class HistoryWriter:
         self._known: tuple[int, int] | None = None
         self._sender = _sender_of(node, self._file)
         self._untaken: str | None = None
-        self._writer = writer
         self._waiting = WaitingChanges()
         self._problem: str | None = None
         self.trend: Trend | None = None
@@ -361,10 +359,6 @@ class HistoryWriter:
         with self._failures_remembered():
             await self._written(lambda file: file.set_baseline(self.valve, kept))
 
-    def keep_told_level(self, level: Level) -> None:
-        """Queue the level reported last for storage."""
-        self.keep_soon(lambda file: database.keep_told_level(file, self.valve, level))
-
     def alarm_news(self) -> dict[AlarmKind, Alarm]:
         """Return the alarms of the valve changed in the file, also by another process."""
         if self._file is None:
@@ -427,8 +421,13 @@ class HistoryWriter:
         if self._file is None:
             return
         self._waiting.add(change, identification)
-        job = (self._file, time.monotonic(), self._trend_job())
-        self.trend = await done_in(self._writer, self._write, *job)
+        file, asked, trend = self._file, time.monotonic(), self._trend_job()
+
+        def write() -> Trend | None:
+            self._write_waiting(file, asked)
+            return trend(file, self.valve.name)
+
+        self.trend = await done_in(self._writer, write)
 
     @contextlib.contextmanager
     def _failures_remembered(self) -> Iterator[None]:
@@ -445,14 +444,8 @@ class HistoryWriter:
         except (HistoryError, InternalError) as error:
             self._complain(error)
 
-    def _write(
-        self, file: "HistoryFile", asked: float, trend: Callable[["HistoryFile", str], Trend | None]
-    ) -> Trend | None:
-        """Write all waiting changes, requested at `asked` (s, monotonic); return the trend."""
-        self._write_waiting(file, asked)
-        return trend(file, self.valve.name)
-
     def _write_waiting(self, file: "HistoryFile", asked: float) -> None:
+        """Write all waiting changes, requested at `asked`, s of a monotonic clock."""
         if self._waiting.first() is None:
             return
         with self._writer.writing(file.path, asked):

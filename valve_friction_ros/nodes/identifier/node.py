@@ -11,7 +11,6 @@
 
 import contextlib
 import math
-import sys
 import time
 from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
 from dataclasses import fields
@@ -185,10 +184,7 @@ class Identifier(ManagedNode):
     """
 
     def __init__(
-        self,
-        workers: Workers | None = None,
-        namespace: str | None = None,
-        **named: Any,
+        self, workers: Workers | None = None, namespace: str | None = None, **named: Any
     ) -> None:
         super().__init__("identifier", namespace=namespace, **named)
         with self.removed_if_refused():
@@ -561,7 +557,3 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the node."""
     with running_workers(_PROCESSES) as workers:
         return run_nodes(lambda: [Identifier(workers)], arguments)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

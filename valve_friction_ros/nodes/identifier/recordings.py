@@ -211,7 +211,9 @@ def remove_oldest(
     """
     pattern = re.compile(rf"alarm_{re.escape(valve)}_(\d{{8}}T\d{{6}}Z)_(WARN|ERROR)(?:_(\d+))?")
     found: dict[Path, tuple[str, int, str]] = {}
-    for place in _folders(folder):
+    for place in sorted(folder.iterdir()) if folder.is_dir() else ():
+        if not place.is_dir() or place.is_symlink():
+            continue
         if (name := pattern.fullmatch(place.name)) and _is_recording(place):
             found[place] = name[1], int(name[3] or 1), name[2]
         elif place.name.startswith(".saving_") and _is_left(place, pattern):
@@ -235,13 +237,6 @@ def _useless_first(found: Mapping[Path, tuple[str, int, str]]) -> list[Path]:
         (others if level == before else firsts).append(place)
         before = level
     return others + firsts
-
-
-def _folders(folder: Path) -> Iterator[Path]:
-    if folder.is_dir():
-        for place in sorted(folder.iterdir()):
-            if place.is_dir() and not place.is_symlink():
-                yield place
 
 
 def _is_recording(place: Path) -> bool:

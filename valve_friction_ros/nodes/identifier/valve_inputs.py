@@ -99,13 +99,12 @@ class ValveInputs:
         hand_on: Callable[[Arrivals], None],
         drop: Callable[[Signal, int], None],
     ) -> None:
-        self._node = node
-        self._hand_on = hand_on
-        self._drop = drop
-        self._joint = joint
+        self._node, self._joint = node, joint
+        self._hand_on, self._drop = hand_on, drop
         self._pressure = _Input(node, FluidPressure, "actuator_pressure", stream(), raw=True)
         self._stem = _Input(node, JointState, "stem_state", stream(), raw=True)
         self._blocks = _Input(node, Float64MultiArray, "~/samples", blocks(), is_optional=True)
+        self._inputs = (self._pressure, self._stem, self._blocks)
         self._looked = -math.inf
         self._bad_block: str | None = None
 
@@ -118,8 +117,7 @@ class ValveInputs:
         """Return the values of the diagnostic: sources and losses of the samples."""
         pressure, stem, joint = self.names
         values = {"pressure_topic": pressure, "stem_topic": stem, "stem_joint": joint}
-        inputs = (self._pressure, self._stem, self._blocks)
-        for name, one in zip(("pressures", "positions", "blocks"), inputs, strict=True):
+        for name, one in zip(("pressures", "positions", "blocks"), self._inputs, strict=True):
             if (losses := one.losses).lost:
                 values[f"{name} lost [messages]"] = str(losses.lost)
                 values[f"{name} lost [%]"] = f"{100 * losses.share:.3g}"
@@ -199,9 +197,8 @@ class ValveInputs:
         """
         found = [] if self._bad_block is None else [self._bad_block]
         problems = [one.problem(timeout) for one in self._used()]
-        inputs = (self._pressure, self._stem, self._blocks)
-        problems += [one.senders_problem() for one in inputs]
-        problems += [one.loss_problem() for one in inputs]
+        problems += [one.senders_problem() for one in self._inputs]
+        problems += [one.loss_problem() for one in self._inputs]
         return found + [problem for problem in problems if problem is not None]
 
     def _used(self) -> tuple[_Input, ...]:

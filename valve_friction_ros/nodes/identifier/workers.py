@@ -233,9 +233,7 @@ class Schedule:
     def __init__(
         self, node: Node, identify: Callable[[], Awaitable[None]], group: CallbackGroup
     ) -> None:
-        self._node = node
-        self._identify = identify
-        self._group = group
+        self._node, self._identify, self._group = node, identify, group
         self._period = 0.0
         self._timer: Timer | None = None
         self._skip: tuple[str, int] | None = None

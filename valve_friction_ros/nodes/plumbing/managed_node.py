@@ -110,15 +110,9 @@ class ManagedNode(LifecycleNodeMixin, PolledNode):
     def _entities(self) -> list[tuple[Any, Callable[[Any], object]]]:
         """Return all publishers, services and so on, each with the function that destroys it."""
         return [
-            (one, destroy)
-            for entities, destroy in (
-                (self.publishers, self.destroy_publisher),
-                (self.subscriptions, self.destroy_subscription),
-                (self.services, self.destroy_service),
-                (self.timers, self.destroy_timer),
-                (self.clients, self.destroy_client),
-            )
-            for one in entities
+            (one, getattr(self, f"destroy_{kind}"))
+            for kind in ("publisher", "subscription", "service", "timer", "client")
+            for one in getattr(self, f"{kind}s")
         ]
 
     def close(self) -> None:

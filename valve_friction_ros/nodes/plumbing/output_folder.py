@@ -107,11 +107,7 @@ class OutputFolder:
             ) from None
 
     async def kept(
-        self,
-        node: Node,
-        stamp: int,
-        worker: ThreadPoolExecutor,
-        write: Callable[[Path, str], Path],
+        self, node: Node, stamp: int, worker: ThreadPoolExecutor, write: Callable[[Path, str], Path]
     ) -> Path:
         """Write a file in a thread of `worker`, if the valve has disk space left.
 

@@ -14,7 +14,7 @@ import functools
 import itertools
 import math
 import sys
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping
 from typing import Any
 
 from rcl_interfaces.msg import (
@@ -26,10 +26,10 @@ from rcl_interfaces.msg import (
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from valve_friction_ros.model.valve import KarnoppParameters, Valve
+from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.nodes.plumbing.rclpy_private import parameter_overrides
 from valve_friction_ros.outside_text import nearest, resembling
-from valve_friction_ros.settings import KARNOPP, NODE_NAMES, VALVE, Setting, is_known
+from valve_friction_ros.settings import NODE_NAMES, VALVE, Setting, is_known
 
 _TURNS_SIGNALS = ("columns.inverted_position", "columns.opposing_pressure_column")
 """Keys of a valve file that convert the signals of a table, but have no effect on topics."""
@@ -119,15 +119,10 @@ def _wrong_type(settings: Iterable[Setting], changes: Iterable[Parameter]) -> st
     return ""
 
 
-def _typed_names(arguments: Sequence[str]) -> set[str]:
-    """Return the names of the parameters given by ``-p``, for any node."""
-    behind = (word for option, word in itertools.pairwise(arguments) if option in ("-p", "--param"))
-    return {word.partition(":=")[0].rpartition(":")[2] for word in behind}
-
-
 def _require_known(node: Node, names: Collection[str]) -> None:
     """Refuse or log overrides that no node reads."""
-    typed = _typed_names(sys.argv)
+    behind = (word for option, word in itertools.pairwise(sys.argv) if option in ("-p", "--param"))
+    typed = {word.partition(":=")[0].rpartition(":")[2] for word in behind}  # for any node
     for name in parameter_overrides(node):
         if name in names or is_known(name):
             continue
@@ -172,9 +167,7 @@ def values_of(
 
 
 def reject_invalid(
-    node: Node,
-    settings: Iterable[Setting],
-    build: Callable[[Mapping[str, Any]], object],
+    node: Node, settings: Iterable[Setting], build: Callable[[Mapping[str, Any]], object]
 ) -> None:
     """Make `node` reject changes for which `build`, called with all values, raises ValueError."""
     watched = tuple(settings)
@@ -200,8 +193,3 @@ def valve_from(values: Mapping[str, Any]) -> Valve:
         one.name: one.assumed if values[one.name] is None else values[one.name] for one in VALVE
     }
     return Valve(**taken)
-
-
-def karnopp_parameters_from(values: Mapping[str, Any]) -> KarnoppParameters:
-    """Build the model from parameter values; raises ValueError if they are impossible."""
-    return KarnoppParameters(**{one.name: values[one.name] for one in KARNOPP})

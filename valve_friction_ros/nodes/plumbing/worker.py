@@ -169,9 +169,7 @@ class Readiness:
     """Monitors the preparation of a node by a worker; logs `ready` when it is finished."""
 
     def __init__(self, node: Node, worker: Worker, ready: str) -> None:
-        self._node = node
-        self._worker = worker
-        self._ready = ready
+        self._node, self._worker, self._ready = node, worker, ready
         self._tell_at = time.monotonic() + _QUICK
         self._is_ready = self._has_told = False
 
