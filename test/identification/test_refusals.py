@@ -417,3 +417,13 @@ def test_a_stroke_has_ten_samples(samples, share):
             f"sampling is too slow for the motion: the stem moves {share} % of its range between "
             "two samples, 2 s apart; sample faster, or check the stem sensor for a glitch"
         )
+
+
+def test_a_stroke_of_few_stored_values_is_compressed():
+    steps = np.repeat(np.linspace(0, 0.01, 5), 20)
+    position = np.concatenate([steps, steps[::-1]] * 3)
+    text = refusal(require_related_signals, record(position, 1e6 * position + 1e4, period=1.0))
+    assert text.endswith(
+        "25 % of its range between two samples, 1 s apart; export it without compression, sample "
+        "faster, or check the stem sensor for a glitch"
+    )

@@ -97,6 +97,10 @@ _LEAST_SAMPLES_A_STROKE = 10
 
 Chosen: with fewer a stroke has no resting and sliding part, or the sample is a sensor's glitch."""
 
+_HELD = 0.5
+"""Share of the moves that begin after equal samples above which the values are held, as a historian
+does with stored ones."""
+
 
 def require_drive(recording: Recording, valve: Valve) -> None:
     """Refuse a recorded force for a valve with a diaphragm, or a pressure for a valve without one.
@@ -315,8 +319,10 @@ def require_related_signals(recording: Recording) -> None:
     jumps = np.where(_LEAST_SAMPLES_A_STROKE * np.abs(steps) > span, steps, 0.0)
     is_glitch = bool(np.any(jumps[1:] * jumps[:-1] < 0))
     if is_glitch or np.sum(np.abs(jumps)) > _JUMPED * np.sum(np.abs(steps)):
+        is_held = np.mean(steps[:-1][steps[1:] != 0.0] == 0.0) > _HELD
+        remedy = "export it without compression, " if is_held else ""
         raise RefusalError(
             f"sampling is too slow for the motion: the stem moves {100 * step / span:.0f} % of "
-            f"its range between two samples, {recording.sample_period:.3g} s apart; sample faster, "
-            "or check the stem sensor for a glitch"
+            f"its range between two samples, {recording.sample_period:.3g} s apart; {remedy}sample "
+            "faster, or check the stem sensor for a glitch"
         )
