@@ -26,6 +26,7 @@ from valve_friction_ros.identification.engine.coordinates import (
 from valve_friction_ros.identification.engine.intervals import RECTANGLE
 from valve_friction_ros.identification.engine.lags import LagPrior
 from valve_friction_ros.identification.engine.sliding_averages import (
+    FEWEST_EACH_WAY,
     Averages,
     Work,
     averaged_twice,
@@ -283,14 +284,23 @@ class Regression:
         return float(np.clip(solved.lag + change, -self.lag.reach, self.lag.reach))
 
     def descended(self, stribeck: float) -> tuple[Solved, float]:
-        """Iterate until lag and variance agree, without outliers; return the variance too."""
+        """Iterate until lag and variance agree, without outliers; return the variance too.
+
+        Where a record has no noise, half of it may be solved exactly: the others are no outliers
+        then, and certainly not all averages of a direction.
+        """
         lag, variance = 0.0, (3e-2 * self.friction) ** 2
         weight: _Array = np.ones(self.averages.taken.size)
+        is_up = self.averages.mean_velocity[self.averages.taken] > 0.0
+        least = math.sqrt(self.least_variance)
         for _ in range(4):
             solved = self.solve(lag, stribeck, 3.0 * variance, weight)
             total, misfit = np.abs(solved.residual[0] + solved.residual[1]), solved.misfit
-            usual = 2.0 * MEDIAN_MAGNITUDE * _OUTLIER * misfit + 1e-9 * self.friction
+            usual = 2.0 * MEDIAN_MAGNITUDE * _OUTLIER * max(misfit, least)
             weight = (total <= usual).astype(np.float64)
+            for way in (is_up, ~is_up):
+                if np.sum(weight[way]) < FEWEST_EACH_WAY:
+                    weight[way] = 1.0
             variance = max(misfit**2, 0.5 * self.noise_variance(solved), self.least_variance)
             lag = self.later(solved)
         return solved._replace(weight=weight), variance

@@ -25,7 +25,7 @@ from valve_friction_ros.signals import all_around, quantisation_step, stamped_no
 
 _Array = NDArray[np.float64]
 
-_FEWEST, _FEWEST_EACH_WAY = 20, 6
+_FEWEST, FEWEST_EACH_WAY = 20, 6
 _MOST = 4000
 """Averages that a regression needs, in all and in each direction, and the most that it takes."""
 
@@ -302,7 +302,7 @@ def averages_of(
     if (
         noise["velocity"] > _NOISE_OF_SPEED * speed
         or taken.size < _FEWEST
-        or min(up, taken.size - up) < _FEWEST_EACH_WAY
+        or min(up, taken.size - up) < FEWEST_EACH_WAY
     ):
         return None
     averaged = [averaged_twice(half, length) for half in force.halves(time)]
