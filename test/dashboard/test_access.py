@@ -28,14 +28,12 @@ from valve_friction_ros.dashboard.accounts import (
     VARIABLE,
     Access,
     Account,
-    AttemptLimit,
     HashedPassword,
-    LogIn,
     Role,
-    Sessions,
     accounts_from,
 )
 from valve_friction_ros.dashboard.gate import host_of, is_own_origin, own_path
+from valve_friction_ros.dashboard.log_in import AttemptLimit, LogIn, Sessions
 
 
 def test_a_new_hash_is_the_documented_scrypt():

@@ -31,7 +31,8 @@ from local_server import certificate_pair, free_port
 from processes import PATIENCE, wait_until
 from quick_accounts import PASSWORD, quick_account
 
-from valve_friction_ros.dashboard.accounts import VARIABLE, Access, Role, Sessions
+from valve_friction_ros.dashboard.accounts import VARIABLE, Access, Role
+from valve_friction_ros.dashboard.log_in import Sessions
 
 pytest.importorskip("httpx", reason="run `make venv-dashboard`")
 pytest.importorskip("nicegui", reason="run `make venv-dashboard`")

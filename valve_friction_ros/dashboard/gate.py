@@ -28,15 +28,8 @@ from starlette.responses import HTMLResponse, PlainTextResponse, RedirectRespons
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
-from valve_friction_ros.dashboard.accounts import (
-    Access,
-    Account,
-    LogIn,
-    Role,
-    Sessions,
-    limited,
-    network_of,
-)
+from valve_friction_ros.dashboard.accounts import Access, Account, Role
+from valve_friction_ros.dashboard.log_in import LogIn, Sessions, limited, network_of
 from valve_friction_ros.outside_text import page_environment, printable
 
 _BASE = {
