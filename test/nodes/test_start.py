@@ -234,16 +234,19 @@ SHARED = """/**:
 /fv_101/identifier:
   ros__parameters:
     fixed.mass: 1.7
-    fixed: {spring_constant: 0.0}
+    fixed: {spring_constant: 0.0, viscous_friction: null}
+    baseline_coulomb_friction: null
 """
 
 
 def test_a_file_that_nodes_of_several_packages_and_recordings_share(live, tmp_path):
+    """With unset numbers as ``ros2 param dump`` writes them."""
     path = tmp_path / "shared.yaml"
     path.write_text(SHARED)
     process = live.start("identifier", arguments=["--params-file", str(path)])
-    names = ("fixed.mass", "fixed.spring_constant", "use_sim_time")
-    assert live.client.parameters(NODE, *names) == [1.7, 0.0, False]
+    names = ("fixed.mass", "fixed.spring_constant", "fixed.viscous_friction", "use_sim_time")
+    assert live.client.parameters(NODE, *names) == [1.7, 0.0, None, False]
+    assert live.client.parameters(NODE, "baseline_coulomb_friction") == [None]
     told = sorted(line for line in process.errors.splitlines() if "WARN" in line)
     assert len(told) == 2
     assert any("has the parameter 'robot_description': it is ignored" in one for one in told)

@@ -34,6 +34,9 @@ from valve_friction_ros.settings import NODE_NAMES, VALVE, Setting, is_known
 _TURNS_SIGNALS = ("columns.inverted_position", "columns.opposing_pressure_column")
 """Keys of a valve file that convert the signals of a table, but have no effect on topics."""
 
+UNSET = ("null", "None")
+"""Text that ``ros2 param`` uses for an unset parameter, in its file and in its request."""
+
 
 @functools.cache
 def _descriptor(setting: Setting) -> ParameterDescriptor:
@@ -61,7 +64,8 @@ def declare_parameters(node: Node, settings: Iterable[Setting]) -> None:
     """Declare `settings` on `node`; raises rclpy's parameter exceptions for a bad override.
 
     A number may later be set as text, because ``ros2 param load`` sends ``.nan`` and ``1e-06`` as
-    text. A number that ``ros2 param delete`` has unset stays declared.
+    text, and ``null`` of a number that is unset. A number that ``ros2 param delete`` has unset
+    stays declared.
 
     Raises ValueError for an override with a name that no node of this package declares, if it was
     given by ``-p`` or resembles a declared name. Other unknown overrides, as in a file shared with
@@ -69,7 +73,11 @@ def declare_parameters(node: Node, settings: Iterable[Setting]) -> None:
     """
     declared = tuple(settings)
     _require_known(node, {one.name for one in declared})
-    if wrong := _wrong_type(declared, parameter_overrides(node).values()):
+    unset = {one.name: one for one in declared if one.default is None}
+    overrides = parameter_overrides(node)
+    for name in [one for one in unset if one in overrides and overrides[one].value in UNSET]:
+        del overrides[name]
+    if wrong := _wrong_type(declared, overrides.values()):
         raise ValueError(wrong)
 
     def check(changes: list[Parameter]) -> SetParametersResult:
@@ -83,11 +91,12 @@ def declare_parameters(node: Node, settings: Iterable[Setting]) -> None:
         one.name for one in declared if one.default is None or isinstance(one.default, float)
     }
 
-    def read_numbers(changes: list[Parameter]) -> list[Parameter]:
-        return [_read(change) if change.name in numbers else change for change in changes]
+    def read(change: Parameter) -> Parameter:
+        if change.name in unset and change.value in UNSET:
+            return Parameter(change.name)
+        return _read(change) if change.name in numbers else change
 
-    node.add_pre_set_parameters_callback(read_numbers)
-    unset = {one.name: one for one in declared if one.default is None}
+    node.add_pre_set_parameters_callback(lambda changes: [read(change) for change in changes])
 
     def stay_declared(changes: list[Parameter]) -> None:
         for name in [one.name for one in changes if not node.has_parameter(one.name)]:

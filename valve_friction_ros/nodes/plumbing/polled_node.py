@@ -46,6 +46,7 @@ from rclpy.timer import Timer
 from std_srvs.srv import Trigger
 
 from valve_friction_ros.identification.refusal import RefusalError
+from valve_friction_ros.nodes.plumbing.parameters import UNSET
 from valve_friction_ros.nodes.plumbing.qos import REQUESTS
 from valve_friction_ros.nodes.plumbing.rclpy_private import (
     awaits_coroutines,
@@ -57,8 +58,6 @@ from valve_friction_ros.nodes.plumbing.worker import InternalError, bugs_reporte
 _LONGEST_TURN = 0.5
 """Longest time of a turn, s; callbacks that are still ready wait for the next turn."""
 _NO_TYPE_DESCRIPTIONS = Parameter("start_type_description_service", value=False)
-_UNSET = ("null", "None")
-"""Text that ``ros2 param`` uses for an unset parameter, in its file and in its request."""
 _POLL_PERIOD = 0.05
 """Period of polling in an executor of rclpy, s."""
 _STEP_PATIENCE = 1.0
@@ -236,7 +235,7 @@ class PolledNode(Node):
         if not self.has_parameter(parameter.name):
             return False
         now, wanted = self.get_parameter(parameter.name).value, parameter.value
-        return wanted == now or (now is None and wanted in _UNSET)
+        return wanted == now or (now is None and wanted in UNSET)
 
     def exclusive(self, callback: Callable[..., Any]) -> Callable[..., Any]:
         """Return a callback that excludes all others of this node, in any thread.
