@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 
 from valve_friction_ros.held_signals import (
+    archive_dead_band,
     as_archived,
     as_sent_on_change,
-    dead_band,
     without_repeats,
 )
 from valve_friction_ros.model.recording import StampedSignal
@@ -209,17 +209,17 @@ class TestDeadBand:
         for row in range(1, held.size):
             if abs(values[row] - held[row - 1]) <= band:
                 held[row] = held[row - 1]
-        found = dead_band(StampedSignal(self.TIME, held))
+        found = archive_dead_band(StampedSignal(self.TIME, held))
         assert band < found < 1.3 * band
 
     def test_a_sampled_signal_has_none(self):
         noise = np.random.default_rng(10).standard_normal(10_000)
         for values in (noise, np.rint(10 * noise), np.sin(self.TIME), np.zeros(10_000)):
-            assert dead_band(StampedSignal(self.TIME, values)) == 0.0
+            assert archive_dead_band(StampedSignal(self.TIME, values)) == 0.0
 
     def test_a_valve_that_rests_between_moves_has_none(self):
         """Noiseless, at the resolution of a control system: levels of an operator."""
         ends = np.random.default_rng(11).uniform(0.0, 100.0, 41)
         rows = np.cumsum(np.tile([90.0, 10.0], 40))
         values = np.interp(self.TIME, rows, np.repeat(ends, 2)[1:81])
-        assert dead_band(StampedSignal(self.TIME, np.round(values, 1))) == 0.0
+        assert archive_dead_band(StampedSignal(self.TIME, np.round(values, 1))) == 0.0

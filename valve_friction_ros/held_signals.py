@@ -147,7 +147,7 @@ later the next hold follows, unless the signal moves; and the quantile of the ch
 since no change is smaller than a dead band."""
 
 
-def dead_band(signal: StampedSignal) -> float:
+def archive_dead_band(signal: StampedSignal) -> float:
     """Estimate the dead band of a historian, in the signal's unit; 0 for one that is not held.
 
     It is the smallest usual change from a hold, to the next value or to the next hold. Larger

@@ -225,6 +225,8 @@ def test_the_numbers_in_one_stamped_message(live):
         value, half_width = found[name]
         assert value == pytest.approx(float(shown[f"{name} [{unit}]"]), rel=1e-3)
         assert half_width == pytest.approx(float(shown[f"{name} half width [{unit}]"]), rel=1e-2)
+    width = float(shown["dead_band half width [%]"]) / 100
+    assert found["dead_band"][1] == pytest.approx(width, rel=1e-2)
     end = START + 10_000_000 * (len(quick_record()) - 1)
     assert abs(stamp_of(result.header.stamp) - end) < 250  # ns: a double of seconds since 1970
     own = f"{NAMESPACE}/identifier/"

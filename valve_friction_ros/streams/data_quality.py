@@ -452,17 +452,18 @@ class DataQuality:
         for quality in self._signals.values():
             quality.stamp, quality.advance = None, math.inf
         self._skew = _Lasting()
+        self.forget_clocks()
+
+    def forget_clocks(self) -> None:
+        """Forget the comparison of stamps with the clock: those of a played recording are old."""
         self._clocks = {signal: _Lasting() for signal in Signal}
 
     def unusable(self, signal: Signal, now: float) -> float:
         """Return the time since the last usable sample of a signal, s; inf if there was none."""
         return self._signals[signal].unusable(now)
 
-    def faults(self, now: float, is_played: bool = False) -> tuple[DataFault, ...]:
-        """Return the present faults.
-
-        The stamps of a played recording are not compared with the clock.
-        """
+    def faults(self, now: float) -> tuple[DataFault, ...]:
+        """Return the present faults."""
         found = [
             fault
             for signal, quality in self._signals.items()
@@ -470,9 +471,7 @@ class DataQuality:
         ]
         if self._skew.is_fault:
             found.append(DataFault(FaultKind.SKEW, seconds=self._skew.seconds))
-        wrong = {
-            s: one.seconds for s, one in self._clocks.items() if one.is_fault and not is_played
-        }
+        wrong = {s: one.seconds for s, one in self._clocks.items() if one.is_fault}
         alike = len(wrong) == len(self._clocks) and not self._skew.is_fault
         if alike:
             found.append(DataFault(FaultKind.CLOCK, seconds=min(wrong.values(), key=abs)))

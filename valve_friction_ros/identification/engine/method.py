@@ -19,9 +19,9 @@ from typing import NamedTuple
 import numpy as np
 
 from valve_friction_ros.held_signals import (
+    archive_dead_band,
     as_archived,
     as_sent_on_change,
-    dead_band,
     without_repeats,
 )
 from valve_friction_ros.identification.drawing import FRICTION_CURVE, IMPERFECTIONS_FOUND
@@ -421,11 +421,11 @@ def _as_stored(outcome: _Outcome, record: StampedRecord, valve: Valve) -> _Outco
     """
     if record.drive.period <= SLOW_SAMPLING and record.position.period <= SLOW_SAMPLING:
         return outcome
-    force = valve.force_per_drive * dead_band(record.drive)
+    force = valve.force_per_drive * archive_dead_band(record.drive)
     spring = outcome.parameters["spring_constant"].value
     if not spring > 0.0:
         spring = valve.force_per_drive * np.ptp(record.drive.value) / np.ptp(record.position.value)
-    hidden = math.hypot(force, spring * dead_band(record.position)) / math.sqrt(12.0)
+    hidden = math.hypot(force, spring * archive_dead_band(record.position)) / math.sqrt(12.0)
     if hidden == 0.0:
         return outcome
     parameters, numbers = dict(outcome.parameters), dict(outcome.numbers)

@@ -58,7 +58,7 @@ after a start is set sooner than that."""
 
 _CLOCKS = (
     "check the clocks of the sensors and of this machine; to play a recording, set use_sim_time "
-    "and a separate history_file"
+    "and a separate history_file (played in a loop, only its first round is evidence)"
 )
 """What to do about stamps that cannot be right."""
 

@@ -451,7 +451,8 @@ class Identifier(ManagedNode):
         now = time.monotonic()
         found = self._quality.faults(now)
         if any(one.kind is FaultKind.CLOCK for one in found) and self._inputs.is_played():
-            found = self._quality.faults(now, is_played=True)
+            self._quality.forget_clocks()
+            found = self._quality.faults(now)
         valve, joint = self._quality.valve, self._inputs.names.joint
         return {one.what: one.statement(valve, joint) for one in found}
 

@@ -21,7 +21,7 @@ from rclpy.publisher import Publisher
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, Float64MultiArray, MultiArrayDimension, MultiArrayLayout
 
-from valve_friction_ros.health.diagnosis import Diagnosis, dead_band
+from valve_friction_ros.health.diagnosis import Diagnosis, dead_band, dead_band_half_width
 from valve_friction_ros.health.friction_monitor import FrictionMonitor
 from valve_friction_ros.health.levels import Finding, Level, StatusSignal, Survey, by_severity
 from valve_friction_ros.history import HistoryEntry, Trend
@@ -299,6 +299,8 @@ class NumberTopics:
         for kind, name, publisher in self._numbers:
             publisher.publish(Float64(data=numbers[kind].get(name, unknown)))
         if self._result is not None:
+            half_widths["dead_band"] = dead_band_half_width(result, monitor.settings.valve)
+            half_widths["friction_ratio"] = unknown if ratio is None else ratio.half_width
             names = (*_FRICTIONS, *_FIGURES)
             message = JointState(
                 name=list(names),
