@@ -150,21 +150,42 @@ class TestArchived:
         assert np.mean(np.isclose(found.value, expected, rtol=1e-12)) > 0.999
 
     @staticmethod
-    def ramps(count, least, most):
-        """Rounded lines up and down, 30 samples each, whose changes are drawn."""
+    def lines(count, changes, lengths):
+        """Rounded lines up and down, whose changes and lengths are drawn, and a move at the end."""
         generator = np.random.default_rng(6)
-        ends = np.cumsum(generator.uniform(least, most, count) * np.tile([1.0, -1.0], count // 2))
-        values = np.interp(np.arange(30.0 * count - 29.0), 30.0 * np.arange(count), ends)
-        return StampedSignal(np.arange(values.size), np.round(values, 3))
+        steps = generator.uniform(*changes, count) * np.tile([1.0, -1.0], count // 2)
+        rows = np.cumsum(generator.integers(*lengths, count))
+        values = np.interp(np.arange(rows[-1] + 1.0), rows, np.cumsum(steps))
+        return StampedSignal(np.arange(values.size + 1.0), np.append(np.round(values, 3), 100.0))
 
     def test_a_move_stays_a_line(self):
-        signal = self.ramps(30, 20.0, 40.0)
-        assert np.array_equal(as_archived(signal).value, signal.value)
+        """Of the lines, two thirds change by up to 2 % of the range, the others by 20 % or more."""
+        small = self.lines(100, (0.5, 1.9), (4, 40)).value[:-1]
+        large = self.lines(50, (25.0, 40.0), (4, 40)).value
+        values = np.concatenate([small, large])
+        found = as_archived(StampedSignal(np.arange(float(values.size)), values)).value
+        assert not np.array_equal(found[: small.size], small)
+        assert np.array_equal(found[small.size + 1 :], large[1:])
 
-    def test_a_few_lines_are_moves_of_an_operator(self):
-        few, many = self.ramps(18, 1.0, 20.0), self.ramps(40, 1.0, 20.0)
-        assert as_archived(few) is few
-        assert as_archived(many) is not many
+    @pytest.mark.parametrize(
+        ("count", "changes", "lengths", "why"),
+        [
+            (48, (0.5, 1.9), (4, 40), "moves of an operator"),
+            (100, (2.5, 9.0), (4, 40), "a controller's output"),
+            (100, (0.5, 1.9), (4, 6), "a slower scan, once or twice between its samples"),
+        ],
+    )
+    def test_lines_without_a_dead_band(self, count, changes, lengths, why):
+        assert why
+        signal = self.lines(count, changes, lengths)
+        assert as_archived(signal) is signal
+        other = self.lines(100, (0.5, 1.9), (4, 40))
+        assert as_archived(other) is not other
+
+    def test_a_fast_sensor_has_no_historian(self):
+        signal = self.lines(100, (0.5, 1.9), (4, 40))
+        fast = StampedSignal(0.1 * signal.time, signal.value)
+        assert as_archived(fast) is fast
 
     def test_a_curve_is_no_line(self):
         """With spikes, between which it is straight from sample to sample."""

@@ -30,7 +30,7 @@ _PICTURES = {*_PAGES, "planning"}
 MAY_IMPORT = {
     "model": set(),
     "signals": {"model"},
-    "held_signals": {"model"},
+    "held_signals": {"model", "signals"},
     "identification": {"model", "signals", "held_signals"},
     "streams": _CORE,
     "planning": _CORE,

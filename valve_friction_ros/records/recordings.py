@@ -12,13 +12,12 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from itertools import compress
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from valve_friction_ros.held_signals import LARGEST_DEAD_BAND
-from valve_friction_ros.identification.engine.lags import SLOW_SAMPLING
 from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.model.drive import Drive
 from valve_friction_ros.model.recording import Recording
@@ -138,47 +137,50 @@ def _drive(
 
 
 _SCAN, _LONG = 0.1, 10.0
-_FEWEST_PAUSES, _OF_SLOW, _OF_FAST = 10, 0.1, 0.5
-_AS_BEFORE, _ALIKE = 0.8, 1.3
-_MOST_HELD = 1_000_000
-"""Conditions of a compressed signal. Pauses of more than `_LONG` scans, whose period is the `_SCAN`
-quantile of all pauses, take the share `_OF_SLOW` of its time or more, `_OF_FAST` if the scans are
-fast: those of a fast sensor may be lost samples. After the share `_AS_BEFORE` of them, the value is
-within a dead band of the one before. Pauses and the samples between them are not all of about one
-length, up to `_ALIKE` of the usual one. At most about `_MOST_HELD` values are held."""
+_FEWEST_PAUSES, _MOST_TIME, _LEAST_TIME = 10, 0.5, 0.1
+_AS_BEFORE, _CHANGE, _ALIKE = 0.8, 0.1, 1.3
+_MOST_HELD = 300_000
+"""Conditions of compressed signals.
+
+Pauses of more than `_LONG` scans, whose period is the `_SCAN` quantile of all pauses, take more
+than `_MOST_TIME` of a signal, and of the other at least `_LEAST_TIME`: samples may be lost in less.
+After the share `_AS_BEFORE` of them the value has changed by at most `_CHANGE` of its range. Pauses
+and the samples between them are not all of one length, within the factor `_ALIKE`. About
+`_MOST_HELD` values are held at most, some 10 MB."""
 
 
-def _held(read: ReadSignal) -> tuple[ReadSignal, tuple[str, ...]]:
-    """Repeat each stored value of a compressed signal up to the next; return a note with it.
+def _scan(read: ReadSignal) -> float:
+    """Return the period of the scans of a signal, ns."""
+    return float(np.quantile(np.diff(read.stamps), _SCAN)) if read.stamps.size > 1 else 0.0
 
-    Other signals are returned unchanged, without a note, such as samples in bunches of one length
-    with pauses of one length: a gateway has stamped them on arrival.
+
+def _compression(read: ReadSignal) -> float:
+    """Return the share of its time in which a compressed signal has no values; 0 for any other.
+
+    After a bad value nothing is known. Samples in bunches of one length, with pauses of one length,
+    are not compressed: a gateway has stamped them on arrival.
     """
-    pauses = np.diff(read.stamps)
-    scan = float(np.quantile(pauses, _SCAN)) if pauses.size else 0.0
+    pauses, scan = np.diff(read.stamps), _scan(read)
     long = np.flatnonzero(pauses > _LONG * scan)
-    if long.size < _FEWEST_PAUSES or scan <= 0.0:
-        return read, ()
-    least = _OF_SLOW if scan > 1e9 * SLOW_SAMPLING else _OF_FAST
-    changes = np.abs(np.diff(read.values))[long] <= LARGEST_DEAD_BAND * np.ptp(read.values)
+    if long.size < _FEWEST_PAUSES or scan <= 0.0 or read.bad:
+        return 0.0
+    changes = np.abs(np.diff(read.values))[long] <= _CHANGE * np.ptp(read.values)
     regular = (np.max(one) <= _ALIKE * np.median(one) for one in (pauses[long], np.diff(long)))
-    if (
-        np.sum(pauses[long]) < least * np.sum(pauses)
-        or np.mean(changes) < _AS_BEFORE
-        or all(regular)
-    ):
-        return read, ()
-    step = max(scan, float(np.sum(pauses)) / _MOST_HELD)
+    if np.mean(changes) < _AS_BEFORE or all(regular):
+        return 0.0
+    return float(np.sum(pauses[long]) / np.sum(pauses))
+
+
+def _held(read: ReadSignal) -> ReadSignal:
+    """Repeat each stored value of a compressed signal, scan by scan, up to the next."""
+    pauses = np.diff(read.stamps)
+    step = max(_scan(read), float(np.sum(pauses)) / _MOST_HELD)
     times = np.append(np.maximum(np.rint(pauses / step).astype(np.intp), 1), 1)
     which = np.repeat(np.arange(times.size), times)
     since = np.arange(which.size) - np.repeat(np.cumsum(times) - times, times)
     after = (since / times[which] * np.append(pauses, 0)[which]).astype(np.int64)
-    note = (
-        f"{read.signal.name!r} is compressed: each of its {times.size} stored values is held until "
-        "the next"
-    )
     held = read.where(which)
-    return replace(held, stamps=held.stamps + after), (note,)
+    return replace(held, stamps=held.stamps + after)
 
 
 def _recorded(
@@ -188,9 +190,22 @@ def _recorded(
     form = table.layout.form
     for each in reads:
         require_good(each, form)
-    reads, compressed = zip(*map(_held, reads), strict=True)
     if doubts := table.doubts(reads):
         raise ValueError(table.asked(doubts))
+    notes = [] if table.layout.is_own else [table.layout.words]
+    notes += [told for each in reads for told in (left_out(each), jumps_to_zero(each)) if told]
+    shares = [_compression(each) for each in reads]
+    if max(shares) > _MOST_TIME:
+        compressed = [share > _LEAST_TIME for share in shares]
+        notes += [
+            f"{each.signal.name!r} is compressed: each of its {each.stamps.size} stored values is "
+            "held until the next"
+            for each in compress(reads, compressed)
+        ]
+        reads = [
+            _held(each) if is_held else each
+            for each, is_held in zip(reads, compressed, strict=True)
+        ]
     drives = [each for each in reads if each.signal.quantity != "position"]
     (stem,) = (each for each in reads if each.signal.quantity == "position")
     drive, driven_by = _drive(drives, valve, form)
@@ -211,9 +226,6 @@ def _recorded(
         )
     except RefusalError as refusal:
         raise RefusalError(f"{table.name}: {refusal}") from None
-    notes = [] if table.layout.is_own else [table.layout.words]
-    notes += [note for of_one in compressed for note in of_one]
-    notes += [told for each in reads for told in (left_out(each), jumps_to_zero(each)) if told]
     return recording, tuple(notes)
 
 

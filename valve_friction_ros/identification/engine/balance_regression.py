@@ -286,17 +286,16 @@ class Regression:
     def descended(self, stribeck: float) -> tuple[Solved, float]:
         """Iterate until lag and variance agree, without outliers; return the variance too.
 
-        Where a record has no noise, half of it may be solved exactly: the others are no outliers
-        then, and certainly not all averages of a direction.
+        Where a record has no noise, half of it may be solved exactly. All averages of a direction
+        are no outliers, even then.
         """
         lag, variance = 0.0, (3e-2 * self.friction) ** 2
         weight: _Array = np.ones(self.averages.taken.size)
         is_up = self.averages.mean_velocity[self.averages.taken] > 0.0
-        least = math.sqrt(self.least_variance)
         for _ in range(4):
             solved = self.solve(lag, stribeck, 3.0 * variance, weight)
             total, misfit = np.abs(solved.residual[0] + solved.residual[1]), solved.misfit
-            usual = 2.0 * MEDIAN_MAGNITUDE * _OUTLIER * max(misfit, least)
+            usual = 2.0 * MEDIAN_MAGNITUDE * _OUTLIER * misfit + 1e-9 * self.friction
             weight = (total <= usual).astype(np.float64)
             for way in (is_up, ~is_up):
                 if np.sum(weight[way]) < FEWEST_EACH_WAY:

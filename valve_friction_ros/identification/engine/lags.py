@@ -36,9 +36,6 @@ _STATED, _OF_RECORD = 3.0, 0.1
 """Largest lag that is possible, s. Where a larger timing uncertainty is stated, the largest lag in
 deviations of it, and at most as a share of the record."""
 
-SLOW_SAMPLING = LARGEST_LAG
-"""Sampling period, s, above which a lag of one sample is larger than any usual lag."""
-
 _STEP, _MOST_STEPS = 1e-3, 1500
 """Step between the lags, s, and about the largest number of steps in each direction."""
 

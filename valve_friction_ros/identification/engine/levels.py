@@ -21,10 +21,10 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
+from valve_friction_ros.held_signals import SLOW_SAMPLING
 from valve_friction_ros.identification.engine.departures import by_least_magnitudes
 from valve_friction_ros.identification.engine.friction_curve import FrictionCurve
 from valve_friction_ros.identification.engine.intervals import Estimated
-from valve_friction_ros.identification.engine.lags import SLOW_SAMPLING
 from valve_friction_ros.identification.engine.sliding_averages import (
     MeasuredSignal,
     away_from_stops,

@@ -39,15 +39,15 @@ from valve_friction_ros.identification.engine.friction_curve import (
     timed_numbers,
 )
 from valve_friction_ros.identification.engine.intervals import (
+    ARCHIVE,
     ASYMMETRY,
-    DEAD_BAND,
     Estimated,
     NumbersAt,
     estimated,
     found_sizes,
     reported_numbers,
 )
-from valve_friction_ros.identification.engine.lags import SLOW_SAMPLING, LagPrior, LagProfile
+from valve_friction_ros.identification.engine.lags import LagPrior, LagProfile
 from valve_friction_ros.identification.engine.levels import curve_of_levels
 from valve_friction_ros.identification.engine.moving_part import MovingPart, moving_part
 from valve_friction_ros.identification.engine.posterior_fit import PosteriorFit
@@ -205,6 +205,7 @@ def _identified(
             *_doubts(misfit),
             *outcome.warnings,
             *verdicts.sampling_remarks(record),
+            *verdicts.archive_remarks(recording, stamped),
             *beside,
         ),
         evidence={
@@ -416,14 +417,12 @@ def _as_sampled(
 def _as_stored(outcome: _Outcome, record: StampedRecord, valve: Valve) -> _Outcome:
     """Widen the friction by what a historian has not stored of the force and of the spring.
 
-    A dead band hides what a converter with that step would round off, on one side of the signal as
-    long as it moves one way: no averaging removes it.
+    A held value is behind the signal by up to a dead band, on the same side throughout a move, so
+    no averaging removes that.
     """
-    if record.drive.period <= SLOW_SAMPLING and record.position.period <= SLOW_SAMPLING:
-        return outcome
     force = valve.force_per_drive * archive_dead_band(record.drive)
     spring = outcome.parameters["spring_constant"].value
-    if not spring > 0.0:
+    if math.isnan(spring):
         spring = valve.force_per_drive * np.ptp(record.drive.value) / np.ptp(record.position.value)
     hidden = math.hypot(force, spring * archive_dead_band(record.position)) / math.sqrt(12.0)
     if hidden == 0.0:
@@ -437,7 +436,7 @@ def _as_stored(outcome: _Outcome, record: StampedRecord, valve: Valve) -> _Outco
             one,
             half_width=math.hypot(one.half_width, NORMAL_QUANTILE * hidden),
             record=math.hypot(one.record, hidden),
-            sources={**one.sources, DEAD_BAND: hidden},
+            sources={**one.sources, ARCHIVE: hidden},
         )
         if math.isfinite(known.value):
             width = math.hypot(known.half_width, NORMAL_QUANTILE * hidden)
@@ -500,25 +499,23 @@ def require_moving_stem(
 
 
 def stamped_record(recording: Recording) -> StampedRecord:
-    """Return the samples at their own stamps, or on the grid if they have none."""
+    """Return the samples at their own stamps, or on the grid if they have none.
+
+    What a historian has interpolated is held.
+    """
     if (stamped := recording.stamped) is not None:
         return replace(
             stamped,
-            drive=as_sent_on_change(_as_archived(stamped.drive)),
-            position=as_sent_on_change(_as_archived(stamped.position)),
+            drive=as_sent_on_change(as_archived(stamped.drive)),
+            position=as_sent_on_change(as_archived(stamped.position)),
         )
     excitation.require_unbroken(recording)
     time = recording.time
     return StampedRecord(
-        _as_archived(StampedSignal(time, recording.drive)),
-        _as_archived(StampedSignal(time, recording.position)),
+        as_archived(StampedSignal(time, recording.drive)),
+        as_archived(StampedSignal(time, recording.position)),
         recording.driven_by,
     )
-
-
-def _as_archived(signal: StampedSignal) -> StampedSignal:
-    """Undo the interpolation of a historian, none of which samples as fast as a sensor."""
-    return signal if signal.period <= SLOW_SAMPLING else as_archived(signal)
 
 
 def prior_of(

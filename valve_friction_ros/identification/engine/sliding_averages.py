@@ -16,8 +16,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from valve_friction_ros.held_signals import without_repeats
-from valve_friction_ros.identification.engine.lags import SLOW_SAMPLING, LagPrior
+from valve_friction_ros.held_signals import SLOW_SAMPLING, without_repeats
+from valve_friction_ros.identification.engine.lags import LagPrior
 from valve_friction_ros.identification.trust.uncertainty import MEDIAN_MAGNITUDE
 from valve_friction_ros.model.recording import StampedRecord, StampedSignal
 from valve_friction_ros.model.valve import Valve

@@ -20,7 +20,7 @@ from valve_friction_ros.held_signals import without_repeats
 from valve_friction_ros.identification.engine.coordinates import IMPERFECTIONS, TIMING, Profile
 from valve_friction_ros.identification.engine.friction_curve import FrictionCurve
 from valve_friction_ros.identification.engine.intervals import (
-    DEAD_BAND,
+    ARCHIVE,
     NOISE_LIKE,
     NOT_QUITE,
     ROUNDING,
@@ -44,7 +44,7 @@ from valve_friction_ros.identification.trust.verdict import (
     share_of,
     with_verdict,
 )
-from valve_friction_ros.model.recording import StampedRecord, StampedSignal
+from valve_friction_ros.model.recording import Recording, StampedRecord, StampedSignal
 from valve_friction_ros.signals import quantisation_step, stamped_noise
 from valve_friction_ros.wording import percentage, two_digits
 
@@ -57,7 +57,7 @@ The slip force cannot be negative, so that noise alone makes it positive."""
 _OTHERS = {
     "start_position": "initial stem position",
     ROUNDING: "force within one step of the converter",
-    DEAD_BAND: "changes within the dead band of the historian",
+    ARCHIVE: "changes within the dead band of the historian",
 }
 """Words for the sources of uncertainty that are not imperfections."""
 
@@ -252,6 +252,23 @@ def sampling_remarks(record: StampedRecord) -> tuple[str, ...]:
     return tuple(remarks)
 
 
+def archive_remarks(recording: Recording, held: StampedRecord) -> tuple[str, ...]:
+    """Name the signals of a recording that a historian has interpolated, as they are `held`."""
+    words, given = recording.driven_by.words, recording.stamped or recording
+    pairs = ((f"the {words}", given.drive, held.drive), ("the stem", given.position, held.position))
+    changed = []
+    for name, one, other in pairs:
+        values = one.value if isinstance(one, StampedSignal) else one
+        is_same = values.size != other.value.size or np.array_equal(values, other.value)
+        changed += [] if is_same else [name]
+    if not changed:
+        return ()
+    return (
+        f"{' and '.join(changed)} lie on lines between stored values, as a historian interpolates: "
+        "each stored value is held until the next",
+    )
+
+
 USABLE = 0.1
 """Half width over value up to which a sliding friction is of use to maintenance.
 
@@ -412,7 +429,7 @@ def doubted_by_sampling(
     """Return the verdicts, with friction at most weak where the order of the samples decides it.
 
     A slow historian reads its signals in turn: one may be as old as a sampling `interval`, s, which
-    makes a `change`, N, of the sliding friction.
+    makes a `change`, N, of the sliding friction. A friction that is smaller is not identifiable.
     """
     sliding = parameters[SLIDING]
     if not abs(change) > sliding.half_width:
@@ -421,7 +438,9 @@ def doubted_by_sampling(
         f"one signal recorded a sample ({interval:.2g} s) late would change the sliding friction "
         f"by {abs(change):.3g} N; set timing_uncertainty, 0 if both signals are sampled together"
     )
-    if sliding.verdict is Verdict.WEAK:
+    if abs(change) > abs(sliding.value):
+        sliding = not_identifiable(SLIDING, reason)
+    elif sliding.verdict is Verdict.WEAK:
         sliding = replace(sliding, reason=f"{sliding.reason}; {reason}")
     return weakened({**parameters, SLIDING: sliding}, reason)
 

@@ -184,9 +184,9 @@ def require_two_directions(recording: Recording, window: int, travel: float = ma
     """Refuse a stem that moves in one direction only, or hardly in the other.
 
     The position is averaged over `window` samples first, and over fewer where these take longer
-    than a move may. Turns within its noise are ignored, and so is a distance that a packing may
-    yield elastically before it slides, a share of the `travel` of the valve, m. So few samples do
-    not show how large the noise of an interpolated record is: there a turn is a share of the range.
+    than a move may. Turns within its noise are ignored, and so are those that a packing may yield
+    elastically before it slides, a share of the `travel` of the valve, m. Few samples do not show
+    how large the noise of an interpolated record is: there a turn is also a share of the range.
     """
     require_enough_samples(recording, window)
     elastic = _ELASTIC * travel if math.isfinite(travel) else 0.0
@@ -197,15 +197,14 @@ def require_two_directions(recording: Recording, window: int, travel: float = ma
         position = recording.position[: means * length].reshape(means, length).mean(axis=1)
         noise = measured(recording).white_noise / np.sqrt(length)
         least = 0.0 if length == window else _LEAST_SHARE_OF_DIRECTION * float(np.ptp(position))
-        ways.append(_distances(position, max(_MOTION_OVER_NOISE * noise, least)))
+        ways.append(_distances(position, max(_MOTION_OVER_NOISE * noise, least, elastic)))
     if all(min(one) < max(_LEAST_SHARE_OF_DIRECTION * sum(one), elastic) for one in ways):
-        up, down = ways[0]
-        if max(up, down) < elastic:
+        if (span := float(np.ptp(recording.position))) < elastic:
             raise LittleMotionError(
-                f"the stem moved {up * 1e3:.3g} mm up and {down * 1e3:.3g} mm down, no more than "
-                "a packing may yield before the stem slides: move the valve over several percent "
-                "of its travel"
+                f"the stem moved over {span * 1e3:.3g} mm only, no more than a packing may yield "
+                "before it slides: move the valve over several percent of its travel"
             )
+        up, down = ways[0]
         way = "up" if up > down else "down"
         raise LittleMotionError(
             f"the stem moved only {way} ({up * 1e3:.3g} mm up, {down * 1e3:.3g} mm down): "
