@@ -16,6 +16,7 @@ import pytest
 from records import assert_held, simulated
 
 from valve_friction_ros.identification import RefusalError, identify_plant
+from valve_friction_ros.identification.engine import method
 from valve_friction_ros.identification.trust.uncertainty import mean_sliding_friction
 from valve_friction_ros.model import BENCH_VALVE, HIGH_FRICTION, SensorNoise, simulate
 from valve_friction_ros.records.columns import Columns
@@ -74,11 +75,13 @@ def read(path):
     return found
 
 
-def sampled(seed):
+def sampled(seed, noise=2e-5):
     """Pressure, bar, and stem, %, once a second, with noise; and the sliding friction, N."""
     pressure = slow_levels(seed)
     motion = simulate(BENCH_VALVE, HIGH_FRICTION, pressure, 0.1)
-    record = SensorNoise(2e-5, 100.0, seed).applied_to(simulated(pressure, 0.1, HIGH_FRICTION))
+    record = SensorNoise(noise, 5e6 * noise, seed).applied_to(
+        simulated(pressure, 0.1, HIGH_FRICTION)
+    )
     truth = mean_sliding_friction(HIGH_FRICTION, motion.velocity)
     return record.pressure[::10] / 1e5, 100.0 * record.position[::10] / TRAVEL, truth
 
@@ -102,10 +105,26 @@ def test_the_friction_is_found(export, seed):
     for recorded in (found, read(path)):
         parameters = identify_plant(recorded.recording(), BENCH_VALVE).parameters
         assert_held(parameters, {"sliding_friction": truth})
-        width = parameters["sliding_friction"].half_width
-        # 1.96/√12 of the force in a dead band, and of the spring in that of the stem.
-        hidden = np.hypot(0.0445 * 500.0, 0.003 * TRAVEL * HIGH_FRICTION.spring_constant)
-        assert 0.5 * hidden < width < 0.1 * truth
+        assert parameters["sliding_friction"].half_width < 0.1 * truth
+
+
+def test_interpolated_values_are_held_and_widen_the_interval(export, monkeypatch):
+    """By 1.96/√12 of the force in a dead band, and of the spring in that of the stem."""
+    pressure, stem, truth = sampled(2, noise=6e-5)
+    time, tags = np.arange(pressure.size), []
+    for tag, values, band in (("FV-7.PT", pressure, 0.005), ("FV-7.ZT", stem, 0.3)):
+        rows = stored(values, band)
+        tags.append((tag, time, np.interp(time, rows, values[rows])))
+    recording = read(export(*tags)).recording()
+    result = identify_plant(recording, BENCH_VALVE)
+    (note,) = (one for one in result.warnings if "lie on lines between stored values" in one)
+    assert note.startswith("the pressure and the stem ")
+    assert_held(result.parameters, {"sliding_friction": truth})
+    monkeypatch.setattr(method, "archive_dead_band", lambda _: 0.0)
+    plain = identify_plant(recording, BENCH_VALVE).parameters["sliding_friction"].half_width
+    hidden = np.hypot(0.0445 * 500.0, 0.003 * TRAVEL * HIGH_FRICTION.spring_constant)
+    found = result.parameters["sliding_friction"].half_width
+    assert found == pytest.approx(np.hypot(plain, 1.96 / np.sqrt(12.0) * hidden), rel=0.1)
 
 
 def test_each_value_is_held_until_the_next(export):

@@ -255,7 +255,7 @@ def _read_table(path: Path, valve: Valve, options: ReadingOptions) -> tuple[Reco
     """Read the recordings of all valves in a table; their first note tells how it was read.
 
     The samples are resampled like those of topics, with stamps in whole nanoseconds, so that a
-    recording gives the same numbers from a file and from topics.
+    recording gives the same numbers from a file and from topics, unless it is compressed.
     """
     table = OpenTables((path, *options.beside), options.columns)
     table.require_settled()
