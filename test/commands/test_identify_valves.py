@@ -186,7 +186,7 @@ def test_json_and_exit_code(compared):
 
 
 def test_a_scale_of_the_sensor_qualifies_the_friction(
-    call, write_csv, columns_of, benches, quick_csv, tmp_path
+    printed, write_csv, columns_of, benches, quick_csv, tmp_path
 ):
     """In the text, in JSON and on the page, which plans no work on the packing."""
     valve, packing = benches["low"]
@@ -197,9 +197,7 @@ def test_a_scale_of_the_sensor_qualifies_the_friction(
     path = write_csv(columns_of(read), "scaled.csv")
     page = tmp_path / "page.html"
     options = ("--baseline-recording", quick_csv, "--method", "bench")
-    code, out, _ = call(path, *options, "--json", "--report", page)
-    assert code == 0
-    answer = json.loads(out)
+    answer = printed(path, *options, "--report", page)
     assert (answer["diagnosis"]["level"], answer["diagnosis"]["ne_107"]) == ("WARN", "C")
     assert answer["diagnosis"]["message"].startswith(
         "friction and spring constant have changed by the same factor, which points to the scale "
@@ -225,11 +223,9 @@ def test_text_and_report(compared, tmp_path):
     assert row[3].startswith("0.667 times")
 
 
-def test_a_friction_that_is_given_says_nothing_of_the_spring(call, weak_csv):
-    options = ("--baseline-coulomb-friction", "152.7", "--method", "bench", "--json")
-    code, out, _ = call(weak_csv, *options)
-    assert code == 0
-    assert json.loads(out)["findings"] == []
+def test_a_friction_that_is_given_says_nothing_of_the_spring(printed, weak_csv):
+    options = ("--baseline-coulomb-friction", "152.7", "--method", "bench")
+    assert printed(weak_csv, *options)["findings"] == []
 
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
