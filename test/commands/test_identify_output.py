@@ -16,6 +16,7 @@ import matplotlib.image
 import numpy as np
 import pytest
 from answers import KEYS, column, known, none_for_nan, row_of, values
+from pages import PNG
 from processes import ran
 
 from valve_friction_ros.identification import (
@@ -29,7 +30,6 @@ from valve_friction_ros.model import BENCH_VALVE, LOW_FRICTION
 from valve_friction_ros.wording import two_digits
 
 SETTINGS = IdentificationSettings(assumed_mass=1.6)  # of the valve file
-PNG = b"\x89PNG\r\n\x1a\n"
 BENCH = ("--method", "bench")
 
 
