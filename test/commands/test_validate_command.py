@@ -78,12 +78,6 @@ def call(command):
 
 
 @pytest.fixture
-def printed(told):
-    """Function of arguments: the JSON object that the command prints."""
-    return lambda *words: json.loads(told("validate", *words, "--json"), parse_constant=pytest.fail)
-
-
-@pytest.fixture
 def refused(refused):
     """Function of arguments: the one line with which the command refuses."""
     return partial(refused, "validate")
