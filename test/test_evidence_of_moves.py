@@ -134,9 +134,9 @@ def test_the_moves_do_not_depend_on_the_messages_batches(moves, cuts):
 class TestNoEvidence:
     """Motion 4 lies between 53 s and 55 s."""
 
-    def harmed(self, samples, kind=Kind.POSITION, value=None, at=54.0):
+    def harmed(self, samples, kind=Kind.POSITION, value=None):
         kinds, stamps, values = (one.copy() for one in samples)
-        one = np.flatnonzero((stamps >= START + at * 1e9) & (kinds == kind))[0]
+        one = np.flatnonzero((stamps >= START + 54e9) & (kinds == kind))[0]
         if value is None:
             kinds[one] = Kind.NO_POSITION
         else:

@@ -38,15 +38,15 @@ def stamps(times):
     return START + np.round(np.asarray(times) * 1e9).astype(np.int64)
 
 
-def feed(monitor, command, stem, pressure, every=0.5):
-    """Hand on pairs of times (s) and values (share of the travel, Pa), `every` s at a time."""
+def feed(monitor, command, stem, pressure):
+    """Hand on pairs of times (s) and values (share of the travel, Pa), half a second at a time."""
     kinds = [(Kind.POSITION, stem, TRAVEL), (Kind.PRESSURE, pressure, 1.0)]
     at = np.concatenate([stamps(times) for _, (times, _), _ in kinds])
     of = np.concatenate([np.full(len(times), kind, np.uint8) for kind, (times, _), _ in kinds])
     values = np.concatenate([scale * np.asarray(each) for _, (_, each), scale in kinds])
     order = np.argsort(at, kind="stable")
     told, given = stamps(command[0]), TRAVEL * np.asarray(command[1])
-    edges = np.arange(at.min(), at.max() + every * 2e9, round(every * 1e9))
+    edges = np.arange(at.min(), at.max() + 1e9, 500_000_000)
     cuts = np.searchsorted(at[order], edges), np.searchsorted(told, edges)
     for a, b, c, d in zip(cuts[0][:-1], cuts[0][1:], cuts[1][:-1], cuts[1][1:], strict=True):
         part = order[a:b]
@@ -141,12 +141,12 @@ def lagging(command, times, dead_time, lag):
     return answer
 
 
-def answered(dead_time, lag, noise=1e-5, rate=100.0, offset=0.0):
+def answered(dead_time, lag, offset=0.0):
     command = held(SCHEDULE)
-    times = np.arange(0, 140.0, 1 / rate)
+    times = np.arange(0, 140.0, 0.01)
     stem = lagging(command, times, dead_time, lag)
     pressure = 8e4 + SPAN * stem + 20 * RNG.standard_normal(times.size)
-    measured = stem + offset + noise * RNG.standard_normal(times.size)
+    measured = stem + offset + 1e-5 * RNG.standard_normal(times.size)
     return follow(command, times, measured, pressure)
 
 

@@ -13,12 +13,9 @@ import json
 import os
 import sys
 
-import rclpy
-from rclpy.executors import SingleThreadedExecutor
-
 from valve_friction_ros.commands.demo.bench import (
-    BenchClient,
     NodeProcess,
+    bench_client,
     quick_discovery,
     running_nodes,
 )
@@ -60,17 +57,8 @@ def visit(client):
 
 if __name__ == "__main__":
     os.environ.update(quick_discovery())
-    with running_nodes(NODES, "fv_7") as processes:
-        rclpy.init(args=[])
-        node = rclpy.create_node("demo", namespace="fv_7")
-        executor = SingleThreadedExecutor()
-        executor.add_node(node)
-        client = BenchClient(node, executor, "fv_7", RecordBuffer(BENCH_VALVE, 1.0))
-        try:
-            answers = visit(client)
-        finally:
-            executor.shutdown()
-            node.destroy_node()
-            rclpy.try_shutdown()
+    buffer = RecordBuffer(BENCH_VALVE, 1.0)
+    with running_nodes(NODES, "fv_7") as processes, bench_client("fv_7", buffer) as client:
+        answers = visit(client)
     answers["exit codes"] = [process.returncode for process in processes]
     json.dump(answers, sys.stdout)

@@ -41,9 +41,25 @@ def command(capsys):
     """Function of a sub-command and its arguments: exit code, stdout and stderr."""
 
     def command(*arguments):
-        return (run_here(arguments), *capsys.readouterr())
+        try:
+            code = run_here(arguments)
+        except SystemExit as end:  # of the parser
+            code = end.code
+        return (code, *capsys.readouterr())
 
     return command
+
+
+@pytest.fixture
+def told(command):
+    """Function of a sub-command and arguments, which must end well and without a word: stdout."""
+
+    def told(*arguments):
+        code, out, err = command(*arguments)
+        assert (code, err) == (0, "")
+        return out
+
+    return told
 
 
 @pytest.fixture
@@ -87,18 +103,10 @@ def refusal(refused):
     return partial(refused, "identify")
 
 
-@pytest.fixture(name="run")
-def history_run(file, command, capsys):
-    """Function of arguments of `history` on the file of the tests: exit code, stdout, stderr."""
-
-    def call(*arguments, path=file):
-        try:
-            return command("history", path, *arguments)
-        except SystemExit as end:
-            code = end.code
-        return (code, *capsys.readouterr())
-
-    return call
+@pytest.fixture
+def listed(file, told):
+    """Function of arguments of `history` on the file of the tests: what it prints."""
+    return lambda *arguments, path=file: told("history", path, *arguments)
 
 
 @pytest.fixture(scope="session")

@@ -21,6 +21,7 @@ import time
 from pathlib import Path
 
 import pytest
+from pages import PNG
 from processes import ran, wait_until
 from rich.console import Console
 
@@ -46,7 +47,6 @@ from valve_friction_ros.model import BENCH_VALVE, LOW_FRICTION
 from valve_friction_ros.nodes.plumbing.rclpy_private import PROFILES
 from valve_friction_ros.settings import KARNOPP
 
-PNG = b"\x89PNG\r\n\x1a\n"
 HALF_WIDTH = 0.01  # of the value
 
 

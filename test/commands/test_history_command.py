@@ -16,7 +16,8 @@ from dataclasses import replace
 
 import matplotlib.image
 import pytest
-from histories import DAY, OTHER, START, VALVE, refused, success
+from histories import DAY, OTHER, START, VALVE, success
+from histories import refused as refusal_at
 from kept_rows import csv_rows
 
 from valve_friction_ros.commands.arguments.declared import DECLARATIONS
@@ -37,24 +38,22 @@ def file(tmp_path_factory):
     for week in range(20):
         friction = 150.0 + DRIFT * week * 7 * DAY / MONTH
         history.add(success(START + week * 7 * DAY, friction, 1.0, baseline=BASELINE))
-    history.add(refused(START + DAY, "too little travel: move the valve"))
+    history.add(refusal_at(START + DAY, "too little travel: move the valve"))
     history.add(success(START, 80.0, valve=OTHER, verdict=Verdict.WEAK))
     history.add(success(START + DAY, valve=OTHER))
     return history.path
 
 
-def told(run, *arguments, **path):
-    code, output, errors = run("--json", *arguments, **path)
-    assert (code, errors) == (0, "")
-    return json.loads(output)["valves"]
+@pytest.fixture
+def valves(listed):
+    """Function of arguments of `history` on the file of the tests: the valves, by JSON."""
+    return lambda *arguments, **path: json.loads(listed("--json", *arguments, **path))["valves"]
 
 
 class TestTable:
-    def test_entries_with_trend(self, run, monkeypatch):
+    def test_entries_with_trend(self, listed, monkeypatch):
         monkeypatch.setenv("COLUMNS", "160")
-        code, output, errors = run()
-        assert (code, errors) == (0, "")
-        lines = [" ".join(line.split()) for line in output.splitlines()]
+        lines = [" ".join(line.split()) for line in listed().splitlines()]
         assert "FV-101 /fv_101/identifier" in lines
         assert "LV-7 /area_2/lv_7/identifier" in lines
         assert "2026-09-21 14:13:20 F_c 150.0 ± 1.0 identified 1.06 OK friction normal" in lines
@@ -66,31 +65,31 @@ class TestTable:
         (limit,) = (line for line in lines if "expected on" in line)
         assert limit.startswith("trend: warn_ratio (176.2 N) expected on 2027-06-1")
 
-    def test_an_insignificant_drift_has_no_number(self, tmp_path, run):
+    def test_an_insignificant_drift_has_no_number(self, tmp_path, listed, valves):
         history = HistoryFile(tmp_path / "history.sqlite")
         for day, friction in enumerate((150.0, 154.0, 151.0, 156.0, 153.0)):
             history.add(success(START + day * DAY, friction))
-        _, output, _ = run(path=history.path)
+        output = listed(path=history.path)
         assert (
             "no significant drift of Coulomb friction over 5 days with records, 2026-09" in output
         )
         assert "month" not in output
-        (valve,) = told(run, path=history.path)
+        (valve,) = valves(path=history.path)
         found = [valve["trend"][name] for name in ("significant", "drift_n_per_month", "crossing")]
         assert found == [False, None, None]
 
-    def test_two_methods_make_no_common_trend(self, tmp_path, run):
+    def test_two_methods_make_no_common_trend(self, tmp_path, valves):
         """The last one's alone: here five days that lie 100 N above those before."""
         history = HistoryFile(tmp_path / "history.sqlite")
         for day in range(10):
             method, friction = ("bench", 150.0) if day < 5 else ("signature", 250.0)
             history.add(success(START + day * DAY, friction, method=method))
-        (valve,) = told(run, path=history.path)
+        (valve,) = valves(path=history.path)
         assert (valve["trend"]["days"], valve["trend"]["significant"]) == (5, False)
 
-    def test_too_few_days_have_no_trend(self, run):
-        assert "trend" not in run("--valve", "LV-7")[1]
-        (valve,) = told(run, "--valve", "LV-7")
+    def test_too_few_days_have_no_trend(self, listed, valves):
+        assert "trend" not in listed("--valve", "LV-7")
+        (valve,) = valves("--valve", "LV-7")
         assert valve["trend"] is None
 
 
@@ -114,9 +113,9 @@ class TestBaselines:
         history.set_baseline(VALVE, replace(kept, time=START + 4 * DAY, withdrawn=True, **back))
         return history.path
 
-    def test_in_the_table_by_time(self, run, changed, monkeypatch):
+    def test_in_the_table_by_time(self, listed, changed, monkeypatch):
         monkeypatch.setenv("COLUMNS", "160")
-        words = " ".join(run(path=changed)[1].split())
+        words = " ".join(listed(path=changed).split())
         rows = [f"2026-{row}" for row in words.split("2026-")[1:]]
         assert ["baseline" in row for row in rows] == [False, True, False, True, True]
         old, new = "Coulomb friction 141.0 ± 1.0 N", "Coulomb friction 600.0 ± 8.0 N"
@@ -126,8 +125,8 @@ class TestBaselines:
         assert rows[3].strip().endswith(f"{old}; previous: {new}")
         assert rows[4].strip().endswith(f"OK restore_baseline: none; previous: {new}")
 
-    def test_in_json(self, run, changed):
-        first, second, third = told(run, path=changed)[0]["baselines"]
+    def test_in_json(self, valves, changed):
+        first, second, third = valves(path=changed)[0]["baselines"]
         assert first == {
             "time": "2026-09-22T14:13:20.000Z",
             "since": "2026-09-21T14:13:20.000Z",
@@ -146,8 +145,8 @@ class TestBaselines:
 
 
 class TestJson:
-    def test_an_entry(self, run):
-        valve = told(run, "--valve", "FV-101")[0]
+    def test_an_entry(self, valves):
+        valve = valves("--valve", "FV-101")[0]
         assert (valve["name"], valve["tag"]) == VALVE
         entry = valve["entries"][1]
         assert entry["time"] == "2026-09-21T14:13:20.000Z"
@@ -170,8 +169,8 @@ class TestJson:
         assert entry["settings"]["valve"]["diaphragm_area"] == 0.0445
         assert entry["refusal"] == ""
 
-    def test_the_trend_begins_with_the_last_baseline(self, run):
-        trend = told(run, "--valve", "FV-101")[0]["trend"]
+    def test_the_trend_begins_with_the_last_baseline(self, valves):
+        trend = valves("--valve", "FV-101")[0]["trend"]
         assert trend["begin"] == "2026-09-21T14:13:20.000Z"
         assert trend["drift_n_per_month"] == pytest.approx(DRIFT)
         assert 0 < trend["half_width_n_per_month"] < DRIFT
@@ -181,10 +180,10 @@ class TestJson:
 
 
 class TestChoice:
-    def test_by_any_name(self, run):
+    def test_by_any_name(self, valves):
         for name in ("FV-101", "fv_101", "/fv_101", "/fv_101/identifier"):
-            assert [one["name"] for one in told(run, "--valve", name)] == [VALVE.name]
-        found = told(run, "--valve", "area_2/lv_7", "--valve", "FV-101")
+            assert [one["name"] for one in valves("--valve", name)] == [VALVE.name]
+        found = valves("--valve", "area_2/lv_7", "--valve", "FV-101")
         assert {one["name"] for one in found} == {VALVE.name, OTHER.name}
 
     @pytest.mark.parametrize(
@@ -199,23 +198,23 @@ class TestChoice:
             (["--since", "2026-09-22T16:13:20+02:00"], ["2026-09-22T14:13:20.000Z"]),
         ],
     )
-    def test_by_time(self, run, arguments, times):
-        (valve,) = told(run, "--valve", "LV-7", *arguments)
+    def test_by_time(self, valves, arguments, times):
+        (valve,) = valves("--valve", "LV-7", *arguments)
         assert [entry["time"] for entry in valve["entries"]] == times
 
-    def test_a_trend_of_the_time_before_the_baseline(self, tmp_path, run):
+    def test_a_trend_of_the_time_before_the_baseline(self, tmp_path, valves):
         history = HistoryFile(tmp_path / "history.sqlite")
         for day in range(9):
             history.add(success(START + day * DAY, 150.0 + day, 0.1))
         history.set_baseline(VALVE, KeptBaseline(BASELINE, START + 6 * DAY, START + 6 * DAY))
-        (before,) = told(run, "--until", "2026-09-26", path=history.path)
+        (before,) = valves("--until", "2026-09-26", path=history.path)
         assert before["trend"]["days"] == 6
-        assert told(run, path=history.path)[0]["trend"] is None
+        assert valves(path=history.path)[0]["trend"] is None
 
 
-def test_csv(run, tmp_path, file):
+def test_csv(listed, tmp_path, file):
     path = tmp_path / "history.csv"
-    assert run("--csv", path)[0] == 0
+    listed("--csv", path)
     rows = csv_rows(path)
     entries = HistoryFile(file).entries()
     assert len(rows) == len(entries) == 24
@@ -232,29 +231,23 @@ def test_csv(run, tmp_path, file):
     assert (first["level"], first["baseline_n"]) == ("OK", "141.0")
 
 
-def test_plot(run, tmp_path):
+def test_plot(listed, tmp_path):
     path = tmp_path / "history.png"
-    assert run("--plot", path)[0] == 0
+    listed("--plot", path)
     assert matplotlib.image.imread(path).std() > 0.05
 
 
 class TestErrors:
     """One line, and exit code 2."""
 
-    def refused(self, result, *words):
-        code, output, errors = result
-        assert (code, output) == (2, "")
-        assert errors.startswith("valve_friction history: ")
-        assert errors.count("\n") == 1
-        for word in words:
-            assert word in errors
-
-    def test_no_file_and_an_empty_one(self, run, tmp_path):
+    def test_no_file_and_an_empty_one(self, refused, tmp_path):
         path = tmp_path / "none.sqlite"
-        self.refused(run(path=path), str(path), "there is no such file")
+        line = refused("history", path)
+        assert str(path) in line
+        assert "there is no such file" in line
         assert not path.exists()
         HistoryFile(path).prepare()
-        self.refused(run(path=path), "no identification")
+        assert "no identification" in refused("history", path)
 
     @pytest.mark.parametrize(
         ("options", "words"),
@@ -268,15 +261,16 @@ class TestErrors:
             (["--plot", "history.txt"], ["not a picture format"]),
         ],
     )
-    def test_options(self, run, options, words):
-        self.refused(run(*options), *words)
+    def test_options(self, refused, file, options, words):
+        line = refused("history", file, *options)
+        assert [word for word in words if word not in line] == []
 
-    def test_too_many_panels(self, run, tmp_path):
+    def test_too_many_panels(self, refused, tmp_path):
         history = HistoryFile(tmp_path / "many.sqlite")
         for number in range(13):
             history.add(success(valve=VALVE._replace(name=f"/fv_{number}/identifier")))
-        result = run("--plot", tmp_path / "many.png", path=history.path)
-        self.refused(result, "one to 12 valves can be plotted, got 13: choose some with --valve")
+        line = refused("history", history.path, "--plot", tmp_path / "many.png")
+        assert "one to 12 valves can be plotted, got 13: choose some with --valve" in line
 
 
 def test_the_default_file():

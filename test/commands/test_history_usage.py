@@ -45,20 +45,18 @@ def file(tmp_path_factory):
     return history.path
 
 
-def test_below_the_list(run, monkeypatch):
+def test_below_the_list(listed, monkeypatch):
     monkeypatch.setenv("COLUMNS", "160")
-    code, output, errors = run()
-    assert (code, errors) == (0, "")
     figures = "{} m of travel, {} reversals, {} breakaways in {} h monitored"
-    lines = output.splitlines()
+    lines = listed().splitlines()
     new = figures.format("1.5", 10, 4, 21)
     assert f"usage: {new}, since 2026-09-23 (packing renewed)" in lines
     assert f"usage: {figures.format('4.5', 30, 12, 63)}, in all" in lines
     assert "alarm recordings: 2, the latest 2026-09-21T14:13:20Z ERROR: /alarms/1" in lines
 
 
-def test_in_json(run):
-    (valve,) = json.loads(run("--json")[1])["valves"]
+def test_in_json(listed):
+    (valve,) = json.loads(listed("--json"))["valves"]
     assert valve["usage"]["since_renewal"]["distance"] == 1.5
     assert valve["usage"]["renewal"] == "2026-09-23T14:13:20Z"
     days = [one["day"] for one in valve["usage"]["days"]]
@@ -71,28 +69,23 @@ def test_in_json(run):
     }
 
 
-def test_days(run, monkeypatch):
+def test_days(listed, monkeypatch):
     monkeypatch.setenv("COLUMNS", "160")
-    code, output, _ = run("--usage")
-    assert code == 0
-    lines = [" ".join(line.split()) for line in output.splitlines()]
+    lines = [" ".join(line.split()) for line in listed("--usage").splitlines()]
     assert "FV-101 /fv_101/identifier" in lines
     assert "LV-7 /area_2/lv_7/identifier" in lines
     assert "2026-09-22 1.5 10 4 21 1 20 not known" in lines
     assert "2026-09-23 1.5 10 4 21 1 20 2026-09-23" in lines
-    code, output, _ = run("--usage", "--valve", "FV-101", "--until", "2026-09-22")
-    assert code == 0
+    output = listed("--usage", "--valve", "FV-101", "--until", "2026-09-22")
     total = "3 m of travel, 20 reversals, 8 breakaways in 42 h monitored, from 2026-09-21 to"
     assert total in output
     assert "in all" not in output
 
 
-def test_days_in_json_and_csv(run, tmp_path):
+def test_days_in_json_and_csv(listed, tmp_path):
     path = tmp_path / "usage.csv"
     options = ("--valve", "FV-101", "--since", "2026-09-22", "--until", "2026-09-22")
-    code, output, _ = run("--usage", "--json", "--csv", path, *options)
-    assert code == 0
-    (valve,) = json.loads(output)["valves"]
+    (valve,) = json.loads(listed("--usage", "--json", "--csv", path, *options))["valves"]
     assert [one["day"] for one in valve["usage"]["days"]] == ["2026-09-22"]
     (row,) = csv_rows(path)
     assert (row["day"], row["tag"], row["packing_renewed"]) == ("2026-09-22", "FV-101", "")
@@ -109,8 +102,5 @@ def test_days_in_json_and_csv(run, tmp_path):
         (["--usage", "--since", "2027-01-01"], "no usage of these valves within these times"),
     ],
 )
-def test_refused(run, options, words):
-    code, output, errors = run(*options)
-    assert (code, output) == (2, "")
-    assert errors.count("\n") == 1
-    assert words in errors
+def test_refused(refused, file, options, words):
+    assert words in refused("history", file, *options)

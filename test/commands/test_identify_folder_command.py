@@ -26,15 +26,14 @@ import pytest
 from bags import messages_of, write_bag
 from kept_rows import csv_rows, kept, rows_of, run_here
 from processes import PATIENCE, wait_until
+from records import simulated
 
 from valve_friction_ros.identification import IdentificationSettings, identify_bench
 from valve_friction_ros.model import (
     HIGH_FRICTION,
-    Recording,
     SensorNoise,
     SquareWave,
     converter_response,
-    simulate,
 )
 from valve_friction_ros.records.recordings import read_recordings
 from valve_friction_ros.records.valve_file import read_valve_file
@@ -44,11 +43,10 @@ FAULTY = Path(__file__).with_name("faulty_fleet.py")
 
 
 @pytest.fixture(scope="module")
-def short_record(benches):
+def short_record():
     """Twenty seconds of a square wave at 100 Hz: enough to be identified."""
     pressure = converter_response(SquareWave().sample(np.arange(0, 20, PERIOD)), PERIOD)
-    position = simulate(*benches["high"], pressure, PERIOD).position
-    return Recording(PERIOD, pressure, position)
+    return simulated(pressure, PERIOD, HIGH_FRICTION)
 
 
 @pytest.fixture(scope="module")

@@ -16,6 +16,7 @@ import matplotlib.image
 import numpy as np
 import pytest
 from answers import KEYS, column, known, none_for_nan, row_of, values
+from pages import PNG
 from processes import ran
 
 from valve_friction_ros.identification import (
@@ -29,7 +30,6 @@ from valve_friction_ros.model import BENCH_VALVE, LOW_FRICTION
 from valve_friction_ros.wording import two_digits
 
 SETTINGS = IdentificationSettings(assumed_mass=1.6)  # of the valve file
-PNG = b"\x89PNG\r\n\x1a\n"
 BENCH = ("--method", "bench")
 
 
@@ -40,10 +40,9 @@ def result(quick_record):
 
 class TestTable:
     def test_every_parameter_with_interval_and_verdict(
-        self, call, result, quick_csv, bench_options
+        self, told, result, quick_csv, bench_options
     ):
-        code, out, err = call(quick_csv, *bench_options, *BENCH)
-        assert (code, err) == (0, "")
+        out = told("identify", quick_csv, *bench_options, *BENCH)
         for name, unit in UNITS.items():
             one = result.parameters[name]
             published = format(result.estimate.values[name], ".6g")
@@ -78,11 +77,9 @@ class TestTable:
 
 
 class TestPlot:
-    def test_a_picture_and_the_numbers(self, call, quick_csv, bench_options, tmp_path):
+    def test_a_picture_and_the_numbers(self, printed, quick_csv, bench_options, tmp_path):
         picture = tmp_path / "record.png"
-        code, out, err = call(quick_csv, *bench_options, "--plot", picture, "--json")
-        assert (code, err) == (0, "")
-        assert set(json.loads(out)) >= KEYS
+        assert set(printed(quick_csv, *bench_options, "--plot", picture)) >= KEYS
         assert picture.read_bytes().startswith(PNG)
         pixels = matplotlib.image.imread(picture)
         assert min(pixels.shape[:2]) > 500
@@ -204,15 +201,13 @@ def test_without_a_baseline_nothing_was_compared(call, quick_csv, bench_options)
 
 
 @pytest.mark.parametrize("method", ["plant", "bench", "published"])
-def test_all_parameters_are_given(call, quick_csv, bench_options, method):
+def test_all_parameters_are_given(printed, quick_csv, bench_options, method):
     """Nothing is left to identify; the model is compared with the record all the same.
 
     The published method adds an F_s of its own, with which its model may not move at all.
     """
     given = [option for one in (*ALL, "spring_preload=231.65") for option in ("--fix", one)]
-    code, out, err = call(quick_csv, *bench_options, *given, "--method", method, "--json")
-    assert (code, err) == (0, "")
-    answer = json.loads(out)
+    answer = printed(quick_csv, *bench_options, *given, "--method", method)
     assert answer["parameters"]["coulomb_friction"]["verdict"] == "fixed"
     assert answer["fit"] > 0.99 or method == "published"
 

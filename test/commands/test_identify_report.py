@@ -9,7 +9,6 @@
 
 """`identify --report`: one page, read as a browser reads it, and shown by one."""
 
-import json
 import os
 import re
 import struct
@@ -48,14 +47,13 @@ SECTIONS = [
 
 
 @pytest.fixture
-def reported(call, tmp_path, bench_yaml):
+def reported(printed, tmp_path, bench_yaml):
     """Function of a recording and options: its page, and the JSON that was printed beside it."""
 
     def reported(path, *options, valve=("--valve", bench_yaml)):
         page = tmp_path / "report.html"
-        code, out, err = call(path, *valve, *options, "--report", page, "--json")
-        assert (code, err) == (0, "")
-        return PageReader(page.read_text(encoding="utf-8")), json.loads(out)
+        answer = printed(path, *valve, *options, "--report", page)
+        return PageReader(page.read_text(encoding="utf-8")), answer
 
     return reported
 

@@ -24,6 +24,7 @@ from bags import PRESSURE, messages_of, storage_file, write_bag
 from kept_rows import csv_rows
 from pages import PageReader
 from processes import ran
+from records import simulated
 
 from valve_friction_ros.identification import (
     CALIBRATION,
@@ -36,6 +37,8 @@ from valve_friction_ros.model import (
     BENCH_VALVE,
     GRAPHITE_PACKING,
     GRAPHITE_VALVE,
+    HIGH_FRICTION,
+    LOW_FRICTION,
     Recording,
     SensorNoise,
     SineWave,
@@ -100,10 +103,10 @@ def test_calibration_reaches_settings_intervals_and_budget(printed, path):
     assert budget["calibration"] == pytest.approx(error)
 
 
-def test_a_signature(printed, write_csv, columns_of, benches):
+def test_a_signature(printed, write_csv, columns_of):
     """By ``--method signature``, as the library identifies it."""
     pressure = TriangleWave().sample(np.arange(13_000) / 100)
-    record = Recording(0.01, pressure, simulate(*benches["high"], pressure, 0.01).position)
+    record = simulated(pressure, 0.01, HIGH_FRICTION)
     expected = identify_signature(record, BENCH_VALVE, SETTINGS)
     answer = printed(write_csv(columns_of(record)), "--method", "signature")
     assert answer["method"] == "signature"
@@ -154,13 +157,10 @@ def test_a_fall_of_the_friction_is_told_with_its_speed(
 
 
 @pytest.fixture
-def weak_csv(write_csv, benches, columns_of):
+def weak_csv(write_csv, columns_of, quick_record):
     """The quick record of a valve whose spring has lost a third of its stiffness."""
-    valve, packing = benches["low"]
-    weak = replace(packing, spring_constant=packing.spring_constant * 2 / 3)
-    pressure = SineWave(period=10.0).sample(np.arange(1000) / 100)
-    recording = Recording(0.01, pressure, simulate(valve, weak, pressure, 0.01).position)
-    return write_csv(columns_of(recording), "weak.csv")
+    weak = replace(LOW_FRICTION, spring_constant=LOW_FRICTION.spring_constant * 2 / 3)
+    return write_csv(columns_of(simulated(quick_record.pressure, 0.01, weak)), "weak.csv")
 
 
 @pytest.fixture
@@ -186,20 +186,15 @@ def test_json_and_exit_code(compared):
 
 
 def test_a_scale_of_the_sensor_qualifies_the_friction(
-    call, write_csv, columns_of, benches, quick_csv, tmp_path
+    printed, write_csv, columns_of, quick_record, quick_csv, tmp_path
 ):
     """In the text, in JSON and on the page, which plans no work on the packing."""
-    valve, packing = benches["low"]
-    pressure = SineWave(period=10.0).sample(np.arange(1000) / 100)
-    position = simulate(valve, packing, pressure, 0.01).position
-    reference = valve.pressure_reference
-    read = Recording(0.01, reference + 1.5 * (pressure - reference), position)
+    reference = BENCH_VALVE.pressure_reference
+    read = replace(quick_record, drive=reference + 1.5 * (quick_record.pressure - reference))
     path = write_csv(columns_of(read), "scaled.csv")
     page = tmp_path / "page.html"
     options = ("--baseline-recording", quick_csv, "--method", "bench")
-    code, out, _ = call(path, *options, "--json", "--report", page)
-    assert code == 0
-    answer = json.loads(out)
+    answer = printed(path, *options, "--report", page)
     assert (answer["diagnosis"]["level"], answer["diagnosis"]["ne_107"]) == ("WARN", "C")
     assert answer["diagnosis"]["message"].startswith(
         "friction and spring constant have changed by the same factor, which points to the scale "
@@ -225,11 +220,9 @@ def test_text_and_report(compared, tmp_path):
     assert row[3].startswith("0.667 times")
 
 
-def test_a_friction_that_is_given_says_nothing_of_the_spring(call, weak_csv):
-    options = ("--baseline-coulomb-friction", "152.7", "--method", "bench", "--json")
-    code, out, _ = call(weak_csv, *options)
-    assert code == 0
-    assert json.loads(out)["findings"] == []
+def test_a_friction_that_is_given_says_nothing_of_the_spring(printed, weak_csv):
+    options = ("--baseline-coulomb-friction", "152.7", "--method", "bench")
+    assert printed(weak_csv, *options)["findings"] == []
 
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"

@@ -76,11 +76,8 @@ class TestChoice:
         assert "valve_friction_ros.commands.arguments.declared" in loaded
         assert not SLOW & set(loaded)
 
-    def test_version(self, command, capsys):
-        with pytest.raises(SystemExit) as end:
-            command("--version")
-        assert end.value.code == 0
-        assert capsys.readouterr().out == f"valve_friction {__version__}\n"
+    def test_version(self, told):
+        assert told("--version") == f"valve_friction {__version__}\n"
 
     @pytest.mark.parametrize(
         ("arguments", "speaker", "words"),
@@ -93,23 +90,17 @@ class TestChoice:
             ("call fv_101 idnetify", " call", "unknown service 'idnetify'; did you mean 'identify"),
         ],
     )
-    def test_wrong_arguments(self, command, capsys, arguments, speaker, words):
+    def test_wrong_arguments(self, command, arguments, speaker, words):
         """One line, which names the sub-command if there is one."""
-        with pytest.raises(SystemExit) as end:
-            command(*arguments.split())
-        assert end.value.code == 2
-        out, err = capsys.readouterr()
-        assert (out, err.count("\n")) == ("", 1)
+        code, out, err = command(*arguments.split())
+        assert (code, out, err.count("\n")) == (2, "", 1)
         assert err.startswith(f"valve_friction{speaker}: ")
         assert err.endswith("; see --help\n")
         assert words in err
 
     @pytest.mark.parametrize("name", SUB_COMMANDS)
-    def test_each_describes_itself(self, command, capsys, name):
-        with pytest.raises(SystemExit) as end:
-            command(*name.split(), "--help")
-        assert end.value.code == 0
-        out = capsys.readouterr().out
+    def test_each_describes_itself(self, told, name):
+        out = told(*name.split(), "--help")
         assert out.startswith(f"usage: valve_friction {name} ")
         assert "exit code 2" in " ".join(out.lower().replace("; 2:", " exit code 2").split())
         file = re.sub("[- ]", "_", name)

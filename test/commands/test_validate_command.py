@@ -88,31 +88,25 @@ def refused(refused):
     [("bench", SineWave(period=10.0), 40.0), ("signature", TriangleWave(), 130.0)],
 )
 def test_a_model_validates_on_a_record_it_has_not_seen(
-    method, excitation, duration, file_of, other_csv, bench_options, tmp_path, command, call
+    method, excitation, duration, file_of, other_csv, bench_options, tmp_path, told, printed
 ):
     """A record that suits the method is identified, and the slow sine simulated with the model."""
     path = file_of(excitation, duration, "identified.csv")
-    code, printed, _ = command("identify", path, *bench_options, "--method", method, "--json")
-    assert code == 0
     estimate = tmp_path / "estimate.json"
-    estimate.write_text(printed)
+    estimate.write_text(told("identify", path, *bench_options, "--method", method, "--json"))
     answer = json.loads(estimate.read_text())
     assert answer["method"] == method
     assert answer["parameters"]["coulomb_friction"]["value"] == pytest.approx(606.0, rel=0.02)
-    code, out, err = call(other_csv, *bench_options, "--estimate", estimate, "--json")
-    assert (code, err) == (0, "")
-    found = json.loads(out)
+    found = printed(other_csv, *bench_options, "--estimate", estimate)
     assert found["fit"] > 0.995
     assert found["rms"] == pytest.approx(10e-6, abs=10e-6)
     assert found["parameters"]["mass"] == 1.6  # of the valve file
 
 
 class TestAnswer:
-    def test_the_numbers_of_the_library(self, call, estimate, other_csv, bench_options):
+    def test_the_numbers_of_the_library(self, printed, estimate, other_csv, bench_options):
         path = estimate(static_friction=606.0, mass=1.75)
-        code, out, _ = call(other_csv, *bench_options, "--estimate", path, "--json")
-        assert code == 0
-        answer = json.loads(out, parse_constant=pytest.fail)
+        answer = printed(other_csv, *bench_options, "--estimate", path)
         table = np.loadtxt(other_csv, delimiter=",", skiprows=1)
         record = Recording(1 / RATE, table[:, 2], table[:, 1])
         model = KarnoppParameters(1.75, 4.48e4, 606.0, 606.0, 2.05e5, 231.65)
@@ -162,10 +156,9 @@ class TestAnswer:
         assert found == code
         assert json.loads(out)["poor"] == (said[0] if said else None)
 
-    def test_a_picture(self, call, estimate, other_csv, bench_options, tmp_path):
+    def test_a_picture(self, told, estimate, other_csv, bench_options, tmp_path):
         path = tmp_path / "validation.png"
-        code, *_ = call(other_csv, *bench_options, "--estimate", estimate(), "--plot", path)
-        assert code == 0
+        told("validate", other_csv, *bench_options, "--estimate", estimate(), "--plot", path)
         assert matplotlib.image.imread(path).shape[0] > 500
 
 

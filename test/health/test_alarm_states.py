@@ -64,11 +64,11 @@ def request(action, text="seen", **given):
     return AlarmRequest(action, "A. Operator", text, given.get("duration", DURATION.get(action, 0)))
 
 
-def after(*steps, time=NOW):
+def after(*steps):
     """Return the alarm after conditions and actions, a second apart."""
     alarm = Alarm(HIGH)
     for number, step in enumerate(steps):
-        now = time + number * 10**9
+        now = NOW + number * 10**9
         if isinstance(step, Condition):
             for event in followed_by(alarm, step, now):
                 alarm = event.alarm

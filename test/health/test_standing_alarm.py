@@ -391,8 +391,8 @@ EARLIER_ALARM = Diagnosis(
 DOUBT = "the Karnopp model does not describe this valve (misfit 9 µm)"
 
 
-def kept_estimate(friction=400.0, diagnosis=EARLIER_ALARM, baseline=HEALTHY_FRICTION, **changes):
-    return replace(success(START, friction, baseline=baseline, **changes), diagnosis=diagnosis)
+def kept_estimate(diagnosis=EARLIER_ALARM, baseline=HEALTHY_FRICTION, **changes):
+    return replace(success(START, 400.0, baseline=baseline, **changes), diagnosis=diagnosis)
 
 
 def monitor_with(earlier, baseline=HEALTHY_FRICTION, limits=None):

@@ -199,10 +199,10 @@ def refusal(requirement, *arguments):
     return str(caught.value)
 
 
-def triangle(up, down, samples=1000):
+def triangle(up, down):
     """A noiseless stem that moves `up`, then `down`, at one speed."""
-    turn = round(samples * up / (up + down))
-    return np.concatenate([np.linspace(0, up, turn), np.linspace(up, up - down, samples - turn)])
+    turn = round(1000 * up / (up + down))
+    return np.concatenate([np.linspace(0, up, turn), np.linspace(up, up - down, 1000 - turn)])
 
 
 def test_ten_windows_are_enough():
@@ -357,14 +357,14 @@ def test_a_twentieth_of_the_top_speed_is_motion(share, counts):
     assert (found[:2] != pytest.approx(_followed(clean)[:2], rel=1e-9)) is counts
 
 
-def strokes_explaining(share, slope=2e6):
+def strokes_explaining(share):
     """Strokes with as much scatter as leaves this share of the pressure explained."""
     scatter = 1e4
     for _ in range(40):  # more scatter explains less
-        found = _followed(strokes(scatter, slope))[1]
+        found = _followed(strokes(scatter))[1]
         scatter *= np.sqrt(found / share)
     assert found == pytest.approx(share, abs=0.005)
-    return strokes(scatter, slope)
+    return strokes(scatter)
 
 
 def test_a_tenth_of_the_pressure_must_be_explained():

@@ -33,23 +33,23 @@ COLUMNS = Columns(
 )
 
 
-def stored(values, dead_band, heartbeat=600):
-    """Rows that leave the dead band, those before them, and one after each heartbeat."""
+def stored(values, dead_band):
+    """Rows that leave the dead band, those before them, and one a minute."""
     rows = [0]
     for row in range(1, values.size):
         if abs(values[row] - values[rows[-1]]) > dead_band:
             rows += [row - 1, row]
-        elif row - rows[-1] >= heartbeat:
+        elif row - rows[-1] >= 600:
             rows.append(row)
     return np.unique(rows)
 
 
-def slow_levels(seed, count=7200):
+def slow_levels(seed):
     """Two hours of slow moves between levels, at 10 Hz."""
     generator = np.random.default_rng(seed)
     edges = np.cumsum(generator.uniform(20.0, 240.0, 80))
     places = np.repeat(generator.uniform(0.1, 0.9, 41), 2)[1:81]
-    share = np.interp(np.arange(10 * count) / 10, edges, places)
+    share = np.interp(np.arange(72_000) / 10, edges, places)
     return 41_740.0 + 165_100.0 * share
 
 

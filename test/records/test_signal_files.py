@@ -98,9 +98,9 @@ def refused(paths, **form):
     return message
 
 
-def assert_true(recording, begin=BEGIN):
+def assert_true(recording):
     """The stem to the last digit that is written; the pressure to that, and a line between it."""
-    assert recording.start_time == pytest.approx(begin.timestamp() + LATER, abs=1e-3)
+    assert recording.start_time == pytest.approx(BEGIN.timestamp() + LATER, abs=1e-3)
     count = len(recording)
     assert count == COUNT - 1
     fine = 1e-8 * BENCH_VALVE.travel

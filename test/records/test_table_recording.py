@@ -101,11 +101,10 @@ class TestGoodFiles:
         """Days since 1899-12-30, or WinCC's millionths of them; summer in Berlin is UTC + 2 h."""
         noon = datetime(2026, 7, 1, 12, tzinfo=timezone.utc).timestamp()
         days = (noon + np.arange(40) / 10) / 86_400 + 25_569
-        stamps = [f"{factor * day:.9f}" for day in days]
         lines = ["Time_ms,position (m),pressure (Pa)"]
         lines += [
-            f"{a},{b!r},{c!r}"
-            for a, b, c in zip(stamps, POSITION.tolist(), PRESSURE.tolist(), strict=True)
+            f"{factor * day:.9f},{row}"
+            for day, row in zip(days, rows(POSITION, PRESSURE), strict=True)
         ]
         for zone, shift in (("", 0.0), ("Europe/Berlin", -7200.0)):
             found = read_csv(write(lines), form=Columns(time_zone=zone))
@@ -120,12 +119,8 @@ class TestGoodFiles:
 
     def test_further_columns_and_any_order(self, write):
         lines = ["note,pressure_pa,tag,position_m,time_s,force_n"]
-        lines += [
-            f'"a, ""b""",{pressure!r},nan,{position!r},{time!r},'
-            for time, position, pressure in zip(
-                TIME.tolist(), POSITION.tolist(), PRESSURE.tolist(), strict=True
-            )
-        ]
+        unknown = np.full(TIME.size, math.nan)
+        lines += [f'"a, ""b""",{row},' for row in rows(PRESSURE, unknown, POSITION, TIME)]
         assert_good(read_csv(write(lines)))
 
     def test_other_headers(self, write):
@@ -321,11 +316,7 @@ class TestColumns:
 
     def test_the_unit_of_a_named_column_that_cannot_be_si_is_asked_for(self, write):
         """1.2 of a pressure may be bar; Pa would be read wrongly without a word."""
-        rows = [
-            f"{t!r},{1e3 * x!r},{1e-5 * p!r}"
-            for t, x, p in zip(TIME.tolist(), POSITION.tolist(), PRESSURE.tolist(), strict=True)
-        ]
-        path = write(["time_s,Stem,Air", *rows])
+        path = write(["time_s,Stem,Air", *rows(TIME, 1e3 * POSITION, 1e-5 * PRESSURE)])
         form = Columns(position_column="Stem", pressure_column="Air")
         told = refused(path, form=form)
         assert "the unit of the pressure 'Air', values from 1.09992 to 1.1" in told

@@ -73,11 +73,10 @@ def stroked_record(seat=0.0, low=-0.15, high=1.15):
     return SensorNoise(5e-6, 50.0, seed=1).applied_to(Recording(0.01, pressure, position))
 
 
-def sine_record(parameters, duration=16.0):
+def sine_record(parameters):
     """Four strokes of two seconds and more, at 100 Hz, without noise."""
-    pressure = SineWave(period=4.0).sample(np.arange(round(100 * duration)) / 100)
-    position = simulate(BENCH_VALVE, parameters, pressure, 0.01).position
-    return Recording(0.01, pressure, position)
+    pressure = SineWave(period=4.0).sample(np.arange(1600) / 100)
+    return simulated(pressure, 0.01, parameters)
 
 
 def assert_held(numbers, truth):

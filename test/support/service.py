@@ -37,24 +37,13 @@ def levels(count, seed=0, step=STEP, low=0.3, high=0.7):
     return np.array(found)
 
 
-def signals(
-    places,
-    friction=300.0,
-    static=None,
-    period=12.0,
-    rate=20.0,
-    moving=MOVING,
-    whole=True,
-    start=0.0,
-):
+def signals(places, friction=300.0, period=12.0, rate=20.0, moving=MOVING, whole=True, start=0.0):
     """Stamps (ns), pressure (Pa) and position (m) of moves between places, one a `period`.
 
-    The stem moves by a smooth S; friction is constant, and `static` just before. At rest the
-    pressure goes over to the next breakaway. Not `whole`: samples only near the motions.
+    The stem moves by a smooth S; friction is constant. At rest the pressure goes over to
+    the next breakaway. Not `whole`: samples only near the motions.
     """
-    static = friction if static is None else static
     times, pressures, positions = [], [], []
-    friction = np.broadcast_to(friction, len(places) - 1)
     force_at_rest = SPRING * places[0] + PRELOAD
     for number, (begin, end) in enumerate(pairwise(places)):
         length = period if whole else 2 * REST + moving
@@ -64,8 +53,8 @@ def signals(
         place = begin + (end - begin) * (share - np.sin(2 * np.pi * share) / (2 * np.pi))
         bent = (end - begin) * 2 * np.pi * np.sin(2 * np.pi * share) / moving**2
         way = np.sign(end - begin)
-        force = SPRING * place + PRELOAD + way * friction[number] + MASS * bent
-        onset = SPRING * begin + PRELOAD + way * max(static, friction[number])
+        force = SPRING * place + PRELOAD + way * friction + MASS * bent
+        onset = SPRING * begin + PRELOAD + way * friction
         before = share <= 0
         ramp = np.clip((time[before] - rest + 1.0), 0.0, 1.0)
         force[before] = force_at_rest + (onset - force_at_rest) * ramp
@@ -89,9 +78,9 @@ def parts(whole, cuts):
     return [Arrivals(*(column[begin:end] for column in whole)) for begin, end in pairwise(ends)]
 
 
-def changing_at(hour, before=300.0, after=450.0):
-    """A friction, N, that changes at an hour."""
-    return lambda now: after if now >= hour else before
+def changing_at(hour, after=450.0):
+    """A friction of 300 N that changes at an hour."""
+    return lambda now: after if now >= hour else 300.0
 
 
 def made_moves(hours, friction, seed=0, period=12.0, noise=4.0, offset=None, viscous=0.0, **ranges):

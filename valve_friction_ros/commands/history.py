@@ -19,6 +19,7 @@ from typing import Any
 
 from rich.table import Table
 
+from valve_friction_ros import figures
 from valve_friction_ros.commands.arguments import require_outputs
 from valve_friction_ros.commands.arguments.declared import EARLIEST, LATEST
 from valve_friction_ros.commands.arguments.identification import chosen_valves, has_failed
@@ -388,8 +389,6 @@ def run(options: argparse.Namespace) -> int:
         raise ValueError(f"{options.file}: no identification of these valves within these times")
     figure = None
     if options.plot is not None:
-        from valve_friction_ros import figures  # noqa: PLC0415 - slow to import
-
         try:
             figure = figures.trend_figure(histories, time.time_ns())
         except ValueError as error:

@@ -17,6 +17,7 @@ from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from valve_friction_ros import figures
 from valve_friction_ros.commands.arguments import require_outputs
 from valve_friction_ros.commands.arguments.identification import (
     has_failed,
@@ -142,8 +143,6 @@ def _write_files(
 ) -> None:
     """Write the requested files, with times in a zone; raises OSError, which names the file."""
     if options.plot is not None:
-        from valve_friction_ros import figures  # noqa: PLC0415 - slow to import
-
         figures.save_picture(figures.identification_figure(result), options.plot)
     if options.report is not None:
         from valve_friction_ros import reports  # noqa: PLC0415 - slow to import

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from rich.table import Table
 
+from valve_friction_ros import figures
 from valve_friction_ros.commands.arguments.recording import (
     described,
     read_one,
@@ -119,8 +120,7 @@ def _print(layout: Layout, reads: list[ReadSignal], signals: list[dict[str, Any]
 
 def _draw(options: argparse.Namespace) -> None:
     """Plot the recording in SI units, with the travel from a valve file."""
-    from valve_friction_ros import figures  # noqa: PLC0415 - slow to import
-    from valve_friction_ros.figures.record_figures import record_figure  # noqa: PLC0415
+    from valve_friction_ros.figures.record_figures import record_figure  # noqa: PLC0415 - slow
 
     figures.require_picture_file(options.plot)
     description, reading = described(options.file, options.valve, options)

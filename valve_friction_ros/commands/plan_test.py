@@ -20,6 +20,7 @@ from typing import Any
 from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
+from valve_friction_ros import figures
 from valve_friction_ros.commands.arguments import require_outputs
 from valve_friction_ros.commands.arguments.planning import frictions_from, planned_settings
 from valve_friction_ros.commands.console import plain_console, shown_progress
@@ -282,8 +283,6 @@ def run(options: argparse.Namespace) -> int:
         if path is not None:
             write_whole(path, text.encode())
     if options.figure is not None:
-        from valve_friction_ros import figures  # noqa: PLC0415 - slow to import
-
         figures.save_picture(figures.plan_figure(plan), options.figure)
     if options.json:
         print(json.dumps(as_json(plan, options.output), ensure_ascii=False, allow_nan=False))

@@ -14,6 +14,8 @@ import json
 import math
 from collections.abc import Sequence
 
+from valve_friction_ros import figures
+from valve_friction_ros.commands.arguments import require_outputs
 from valve_friction_ros.commands.arguments.identification import read_estimate
 from valve_friction_ros.commands.arguments.recording import described, read_one
 from valve_friction_ros.commands.process import ExitCode
@@ -62,10 +64,7 @@ def run(options: argparse.Namespace) -> int:
         model = identified_model(estimate, description.known)
     except (RefusalError, ValueError) as error:
         raise type(error)(f"{options.estimate}: {error}") from None
-    if options.plot is not None:
-        from valve_friction_ros import figures  # noqa: PLC0415 - slow to import
-
-        figures.require_picture_file(options.plot)
+    require_outputs(picture=options.plot)
     recorded = read_one(options.file, valve, reading)
     recording = recorded.recording()
     try:

@@ -26,7 +26,7 @@ from valve_friction_ros.held_signals import without_repeats
 from valve_friction_ros.model.checks import require_finite, require_non_negative, require_positive
 from valve_friction_ros.model.recording import StampedSignal
 from valve_friction_ros.model.valve import Valve
-from valve_friction_ros.signals import position_noise, quantisation_step
+from valve_friction_ros.signals import position_noise, quantisation_step, runs_of
 from valve_friction_ros.streams import DAY
 from valve_friction_ros.streams.samples import Arrivals, Kind, Samples
 
@@ -327,8 +327,7 @@ def _motions(both: _Signals, band: float) -> list[tuple[int, int]]:
     before = np.searchsorted(time, time - 0.5 * REST)
     after = np.minimum(np.searchsorted(time, time + 0.5 * REST), time.size - 1)
     moving = np.abs(position[after] - position[before]) > band
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], moving, [False]))))
-    return [(int(first), int(last) - 1) for first, last in edges.reshape(-1, 2)]
+    return [(first, end - 1) for first, end in runs_of(moving)]
 
 
 def _moves_of(

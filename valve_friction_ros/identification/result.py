@@ -421,8 +421,7 @@ class Result:
         stems = []
         for values in random.multivariate_normal(centre, errors, draws, check_valid="ignore"):
             drawn = dict(zip(names, values.tolist(), strict=True))
-            least = {name: 0.0 for name in names if name != "spring_preload"}
-            drawn |= {name: max(drawn[name], bound) for name, bound in least.items()}
+            drawn |= {name: max(drawn[name], 0.0) for name in names if name != "spring_preload"}
             coulomb = drawn.get("coulomb_friction", model.coulomb_friction)
             slip = model.static_friction - model.coulomb_friction
             static = drawn.get("static_friction", coulomb + slip)

@@ -54,9 +54,9 @@ def levels(time):
     return level[(time / 3).astype(int)]
 
 
-def recorded_valve(command, stamps_jitter=0.0, lost=0.0, late=0.0, seed=0):
+def recorded_valve(command, stamps_jitter=0.0, lost=0.0, late=0.0):
     """Simulate the tight packing; jitter over the period, share of lost samples, delay in s."""
-    generator = np.random.default_rng(seed)
+    generator = np.random.default_rng(0)
     time = np.arange(round(DURATION / PERIOD)) * PERIOD
     pressure = converter_response(command(time), PERIOD)
     position = simulate(BENCH_VALVE, HIGH_FRICTION, pressure, PERIOD).position

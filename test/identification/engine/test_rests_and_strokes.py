@@ -75,9 +75,9 @@ def loaded(valve, packing, seed, late=0.0):
     return StampedRecord(StampedSignal(TIME, drive), StampedSignal(TIME + late, stem))
 
 
-def spring_of(packing, share=0.03):
+def spring_of(packing):
     names = ("spring_constant", "spring_preload")
-    return {name: estimated(getattr(packing, name), share) for name in names}
+    return {name: estimated(getattr(packing, name), 0.03) for name in names}
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -138,13 +138,13 @@ VALVE = Valve(0.04, 40e3, 0.03)
 FRICTION, SPRING, PRELOAD = 80.0, 1e5, 400.0
 
 
-def jumping(jumps=8, rest=2.0, size=0.3e-3, uneven=0.0, noise=(0.0, 0.0), seed=0):
+def jumping(jumps=8, rest=2.0, uneven=0.0, noise=(0.0, 0.0), seed=0):
     """Jump to and fro within a sample; before each jump the force is what the stem breaks away at.
 
     While it jumps, the force hardly changes: the mean over the way is spring and friction.
     """
     random = np.random.default_rng(seed)
-    sizes = size * (1.0 + uneven * random.uniform(-1.0, 1.0, jumps))
+    sizes = 0.3e-3 * (1.0 + uneven * random.uniform(-1.0, 1.0, jumps))
     places = np.concatenate([[0.01], 0.01 + np.cumsum(sizes * np.resize([1.0, -1.0], jumps))])
     at = np.clip((JUMP_TIME / rest).astype(int), 0, jumps)
     stem = places[at]

@@ -202,8 +202,8 @@ def estimates(spring=SPRING, preload=PRELOAD, mass=1.6, share=0.01):
     }
 
 
-def causes(parameters, stated, valve=VALVE):
-    return {one.name: one.cause for one in contradictions(parameters, stated, valve, 0.028575)}
+def causes(parameters, stated):
+    return {one.name: one.cause for one in contradictions(parameters, stated, VALVE, 0.028575)}
 
 
 class TestRules:

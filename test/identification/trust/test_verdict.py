@@ -123,8 +123,8 @@ def test_one_alone_has_no_scatter():
     assert math.isnan(found.standard_errors["sum"])
 
 
-def misfit(fit=1.0, systematic=5.0, tolerated=4.0):
-    return Misfit(fit, rms=9.0, systematic=systematic, tolerated=tolerated)
+def misfit(fit=1.0, systematic=5.0):
+    return Misfit(fit, rms=9.0, systematic=systematic, tolerated=4.0)
 
 
 @pytest.mark.parametrize(

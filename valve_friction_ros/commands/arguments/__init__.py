@@ -16,6 +16,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from valve_friction_ros import figures
+
 _OPTION = re.compile(r"^ *(--[a-z-]+)(?: (\S+)|): ", re.MULTILINE)
 
 
@@ -60,6 +62,4 @@ def require_outputs(*files: Path | None, picture: Path | None = None) -> None:
         if path is not None and not path.parent.is_dir():
             raise ValueError(f"{path}: there is no folder {path.parent}")
     if picture is not None:
-        from valve_friction_ros import figures  # noqa: PLC0415 - slow to import
-
         figures.require_picture_file(picture)

@@ -17,17 +17,13 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import fields, replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from valve_friction_ros import model, records
 from valve_friction_ros.commands.arguments import add_options
 from valve_friction_ros.records.bags.topics import VALVE_FILE, TopicChoice
 from valve_friction_ros.records.columns import Columns
-
-if TYPE_CHECKING:
-    from valve_friction_ros.model.valve import Valve
-    from valve_friction_ros.records.recorded_valve import RecordedValve
-    from valve_friction_ros.records.recordings import ReadingOptions
-    from valve_friction_ros.records.valve_file import ValveFile
+from valve_friction_ros.records.files import on_disk, write_whole
 
 
 def add_recording_arguments(parser: argparse.ArgumentParser) -> None:
@@ -112,40 +108,34 @@ def given_columns(arguments: argparse.Namespace) -> dict[str, Any]:
 
 def reading_options(
     arguments: argparse.Namespace, columns: Columns | None = None
-) -> "ReadingOptions":
+) -> "records.ReadingOptions":
     """Build the reading options from the parsed arguments and the valve file.
 
     Raises ValueError if they are incompatible.
     """
-    from valve_friction_ros.records.recorded_valve import Stretch  # noqa: PLC0415
-    from valve_friction_ros.records.recordings import ReadingOptions  # noqa: PLC0415 - slow
-
-    return ReadingOptions(
+    return records.ReadingOptions(
         replace(columns or Columns(), **given_columns(arguments)),
         TopicChoice(
             arguments.pressure_topic, arguments.stem_topic, arguments.joint, arguments.valve_name
         ),
-        Stretch(arguments.begin, arguments.end, arguments.last),
+        records.Stretch(arguments.begin, arguments.end, arguments.last),
         tuple(getattr(arguments, "beside", ())),
     )
 
 
-def valve_of(arguments: argparse.Namespace) -> "ValveFile | None":
+def valve_of(arguments: argparse.Namespace) -> "records.ValveFile | None":
     """Read the given valve file, or that in the bag, if any."""
-    from valve_friction_ros.records.valve_file import read_valve_file  # noqa: PLC0415 - slow
-
     path = arguments.valve or _own_description(arguments.file)
-    return None if path is None else read_valve_file(path, arguments.valve_name)
+    return None if path is None else records.read_valve_file(path, arguments.valve_name)
 
 
-def save_columns(arguments: argparse.Namespace, reading: "ReadingOptions") -> None:
+def save_columns(arguments: argparse.Namespace, reading: "records.ReadingOptions") -> None:
     """Write the recognized format of the table into the valve file, if requested.
 
     Raises ValueError if the recording is a bag or leaves a question open; OSError if writing fails.
     """
     if arguments.save_columns is None:
         return
-    from valve_friction_ros.records.files import write_whole  # noqa: PLC0415
     from valve_friction_ros.records.table import OpenTables  # noqa: PLC0415 - slow to import
     from valve_friction_ros.records.valve_file import with_columns  # noqa: PLC0415
 
@@ -208,20 +198,17 @@ def _own_description(recording: Path) -> Path | None:
 
 def described(
     recording: Path, valve_file: Path | None, arguments: argparse.Namespace
-) -> "tuple[ValveFile, ReadingOptions]":
+) -> "tuple[records.ValveFile, records.ReadingOptions]":
     """Return the valve file of a recording, given or in the bag, and the reading options.
 
     A recorded force needs no valve file. Raises ValueError if the valve file cannot be read, or is
     required but not given.
     """
-    from valve_friction_ros.model.valve import Valve  # noqa: PLC0415 - slow to import
-    from valve_friction_ros.records.files import on_disk  # noqa: PLC0415
-    from valve_friction_ros.records.recordings import holds_force  # noqa: PLC0415
-    from valve_friction_ros.records.valve_file import ValveFile, read_valve_file  # noqa: PLC0415
+    from valve_friction_ros.records.recordings import holds_force  # noqa: PLC0415 - slow to import
 
     valve_file = valve_file or _own_description(recording)
     if valve_file is not None:
-        description = read_valve_file(valve_file, arguments.valve_name)
+        description = records.read_valve_file(valve_file, arguments.valve_name)
         return description, reading_options(arguments, description.columns)
     reading = reading_options(arguments)
     with on_disk(recording) as path:
@@ -231,10 +218,10 @@ def described(
             "pressure needs the diaphragm_area: give a valve file with --valve; `valve_friction "
             "describe-valve` writes one"
         )
-    return ValveFile(Valve(), MappingProxyType({})), reading
+    return records.ValveFile(model.Valve(), MappingProxyType({})), reading
 
 
-def require_one(recorded: "Sequence[RecordedValve]", purpose: str) -> None:
+def require_one(recorded: "Sequence[records.RecordedValve]", purpose: str) -> None:
     """Refuse several valves if `purpose` takes only one.
 
     The ValueError names the valves and the option to choose one.
@@ -244,14 +231,14 @@ def require_one(recorded: "Sequence[RecordedValve]", purpose: str) -> None:
         raise ValueError(f"{purpose} one valve: choose one of {names} with --valve-name")
 
 
-def read_one(path: Path, valve: "Valve", reading: "ReadingOptions") -> "RecordedValve":
+def read_one(
+    path: Path, valve: "model.Valve", reading: "records.ReadingOptions"
+) -> "records.RecordedValve":
     """Read the only valve in a file, or the chosen valve.
 
     Raises ValueError or RefusalError if it cannot be read: one line with file, cause and remedy.
     """
-    from valve_friction_ros.records.recordings import read_recordings  # noqa: PLC0415 - slow
-
     with reading_progress():
-        recorded = read_recordings(path, valve, reading)
+        recorded = records.read_recordings(path, valve, reading)
     require_one(recorded, f"{path} holds several, and this command takes")
     return recorded[0]

@@ -18,9 +18,11 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from rclpy.executors import Executor
+from rclpy.executors import Executor, SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import FluidPressure, JointState
 
 from valve_friction_ros.identification.refusal import RefusalError
@@ -108,6 +110,22 @@ class BenchClient(Caller):
         if answer is None or not answer.success:
             raise RefusalError(f"{service}: {answer.message if answer else 'no answer'}")
         return answer.message
+
+
+@contextlib.contextmanager
+def bench_client(namespace: str, buffer: RecordBuffer) -> Iterator[BenchClient]:
+    """Provide a client of the bench in `namespace`, which is a node of this process."""
+    # Python handles Ctrl-C: the handler of rclpy would end the context under the client.
+    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+    node = rclpy.create_node("demo", namespace=namespace)
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    try:
+        yield BenchClient(node, executor, namespace, buffer)
+    finally:
+        executor.shutdown()
+        node.destroy_node()
+        rclpy.try_shutdown()
 
 
 _STOP_TIMEOUT = 5.0

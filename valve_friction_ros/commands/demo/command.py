@@ -17,9 +17,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 
-import rclpy
-from rclpy.executors import SingleThreadedExecutor
-from rclpy.signals import SignalHandlerOptions
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
@@ -29,6 +26,7 @@ from valve_friction_ros.commands.demo.bench import (
     ANSWER_TIMEOUT,
     BenchClient,
     NodeProcess,
+    bench_client,
     free_domain,
     quick_discovery,
     running_nodes,
@@ -266,18 +264,8 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _demonstrated(options: argparse.Namespace, console: Console) -> int:
-    with running_nodes(_nodes(), _NAMESPACE):
-        # Python handles Ctrl-C: the handler of rclpy would end the context under the client.
-        rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
-        node = rclpy.create_node("demo", namespace=_NAMESPACE)
-        executor = SingleThreadedExecutor()
-        executor.add_node(node)
-        client = BenchClient(node, executor, _NAMESPACE, RecordBuffer(BENCH_VALVE, 2 * _RECORD))
-        try:
-            outcomes = _run(client, console)
-        finally:
-            executor.shutdown()
-            node.destroy_node()
-            rclpy.try_shutdown()
+    buffer = RecordBuffer(BENCH_VALVE, 2 * _RECORD)
+    with running_nodes(_nodes(), _NAMESPACE), bench_client(_NAMESPACE, buffer) as client:
+        outcomes = _run(client, console)
     status: Any = client.status  # an estimate was read from it
     return _report(outcomes, status.level[0], status.message, options.output, console)
