@@ -170,6 +170,33 @@ def test_outages_of_a_fast_sensor_are_gaps(export):
     assert "gap of 1.2" in found.recording().gap
 
 
+def test_a_slow_logger_that_loses_a_sixth_of_its_samples_is_not_compressed(export):
+    """Small moves, once a second: after each outage the value is nearly the same."""
+    generator = np.random.default_rng(7)
+    time, kept = np.arange(5000), np.ones(5000, dtype=bool)
+    for begin in np.linspace(100, 4800, 20).astype(int):
+        kept[begin : begin + generator.integers(12, 70)] = False
+    stem = 50.0 + 40.0 * np.sin(time / 400.0)
+    tags = (("FV-7.PT", time[kept], 1.0 + stem[kept] / 200), ("FV-7.ZT", time[kept], stem[kept]))
+    found = read(export(*tags))
+    assert "is compressed" not in str(found.notes)
+    assert "gap of" in found.recording().gap
+
+
+def test_after_a_bad_value_nothing_is_known(export):
+    pressure, stem, _ = sampled(0)
+    tags = [
+        (tag, rows := stored(values, band), values[rows])
+        for tag, values, band in (("FV-7.PT", pressure, 0.005), ("FV-7.ZT", stem, 0.3))
+    ]
+    path = export(*tags)
+    lines = path.read_text().splitlines()
+    lines[100] = ";".join([*lines[100].split(";")[:2], "I/O Timeout"])
+    path.write_text("\n".join(lines) + "\n")
+    with pytest.raises(RefusalError, match="gaps take"):
+        read(path).recording()
+
+
 def test_bunches_are_not_compressed(export):
     """Twenty samples on arrival, every 10 s."""
     time = np.concatenate([10.0 * bunch + 0.05 * np.arange(20) for bunch in range(40)])
