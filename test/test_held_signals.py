@@ -168,15 +168,11 @@ class TestArchived:
         assert np.array_equal(found[small.size + 1 :], large[1:])
 
     @pytest.mark.parametrize(
-        ("count", "changes", "lengths", "why"),
-        [
-            (48, (0.5, 1.9), (4, 40), "moves of an operator"),
-            (100, (2.5, 9.0), (4, 40), "a controller's output"),
-            (100, (0.5, 1.9), (4, 6), "a slower scan, once or twice between its samples"),
-        ],
+        ("count", "changes", "lengths"),
+        [(48, (0.5, 1.9), (4, 40)), (100, (2.5, 9.0), (4, 40)), (100, (0.5, 1.9), (4, 6))],
+        ids=["few moves of an operator", "a controller's output", "a slower scan"],
     )
-    def test_lines_without_a_dead_band(self, count, changes, lengths, why):
-        assert why
+    def test_lines_without_a_dead_band(self, count, changes, lengths):
         signal = self.lines(count, changes, lengths)
         assert as_archived(signal) is signal
         other = self.lines(100, (0.5, 1.9), (4, 40))

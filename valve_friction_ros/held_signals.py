@@ -10,6 +10,7 @@
 """What a source does to its signal: it repeats, omits or interpolates values; no ROS."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from valve_friction_ros.model.recording import StampedSignal
 from valve_friction_ros.signals import quantisation_step
@@ -24,6 +25,11 @@ _LARGER_STEP = 1.5
 _MANY_LARGER = 0.2
 """More than `_MANY_LARGER` of its changes exceed the least change by the factor `_LARGER_STEP`: a
 converter that follows a slow stem changes by single steps, at any time."""
+
+
+def numbers_in_runs(lengths: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Return 0, 1, … within each of the runs with these lengths, one run after the other."""
+    return np.arange(lengths.sum()) - np.repeat(np.cumsum(lengths) - lengths, lengths)
 
 
 def without_repeats(signal: StampedSignal) -> StampedSignal:
@@ -45,7 +51,7 @@ def without_repeats(signal: StampedSignal) -> StampedSignal:
     if hold < 2 or not (is_steady and is_free):
         return signal
     sent = np.maximum(np.rint(runs / hold), 1.0).astype(np.intp)
-    again = np.arange(sent.sum()) - np.repeat(np.cumsum(sent) - sent, sent)
+    again = numbers_in_runs(sent)
     fresh = np.repeat(changes[:-1], sent) + np.rint(again * np.repeat(runs / sent, sent)).astype(
         np.intp
     )
@@ -119,9 +125,11 @@ def as_archived(signal: StampedSignal) -> StampedSignal:
     signals are returned unchanged, and so is one that is sampled faster than historians do.
     """
     time, value = signal.time, signal.value
+    if signal.period <= SLOW_SAMPLING or value.size < 3 * _FEWEST_LINES:
+        return signal
     steps = np.diff(np.unique(value))
     steps = steps[steps > _ROUNDING * np.sum(steps)]
-    if signal.period <= SLOW_SAMPLING or value.size < 3 * _FEWEST_LINES or not steps.size:
+    if not steps.size:
         return signal
     step = float(steps.min())
     share = (time[2:] - time[1:-1]) / (time[2:] - time[:-2])

@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from valve_friction_ros.held_signals import numbers_in_runs
 from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.model.drive import Drive
 from valve_friction_ros.model.recording import Recording
@@ -149,9 +150,9 @@ and the samples between them are not all of one length, within the factor `_ALIK
 `_MOST_HELD` values are held at most, some 10 MB."""
 
 
-def _scan(read: ReadSignal) -> float:
-    """Return the period of the scans of a signal, ns."""
-    return float(np.quantile(np.diff(read.stamps), _SCAN)) if read.stamps.size > 1 else 0.0
+def _scan(pauses: NDArray[np.int64]) -> float:
+    """Return the period of the scans of a signal, ns, by the pauses between its values."""
+    return float(np.quantile(pauses, _SCAN)) if pauses.size else 0.0
 
 
 def _compression(read: ReadSignal) -> float:
@@ -160,13 +161,14 @@ def _compression(read: ReadSignal) -> float:
     After a bad value nothing is known. Samples in bunches of one length, with pauses of one length,
     are not compressed: a gateway has stamped them on arrival.
     """
-    pauses, scan = np.diff(read.stamps), _scan(read)
+    pauses = np.diff(read.stamps)
+    scan = _scan(pauses)
     long = np.flatnonzero(pauses > _LONG * scan)
     if long.size < _FEWEST_PAUSES or scan <= 0.0 or read.bad:
         return 0.0
-    changes = np.abs(np.diff(read.values))[long] <= _CHANGE * np.ptp(read.values)
+    is_as_before = np.abs(np.diff(read.values))[long] <= _CHANGE * np.ptp(read.values)
     regular = (np.max(one) <= _ALIKE * np.median(one) for one in (pauses[long], np.diff(long)))
-    if np.mean(changes) < _AS_BEFORE or all(regular):
+    if np.mean(is_as_before) < _AS_BEFORE or all(regular):
         return 0.0
     return float(np.sum(pauses[long]) / np.sum(pauses))
 
@@ -174,13 +176,12 @@ def _compression(read: ReadSignal) -> float:
 def _held(read: ReadSignal) -> ReadSignal:
     """Repeat each stored value of a compressed signal, scan by scan, up to the next."""
     pauses = np.diff(read.stamps)
-    step = max(_scan(read), float(np.sum(pauses)) / _MOST_HELD)
+    step = max(_scan(pauses), float(np.sum(pauses)) / _MOST_HELD)
     times = np.append(np.maximum(np.rint(pauses / step).astype(np.intp), 1), 1)
     which = np.repeat(np.arange(times.size), times)
-    since = np.arange(which.size) - np.repeat(np.cumsum(times) - times, times)
-    after = (since / times[which] * np.append(pauses, 0)[which]).astype(np.int64)
+    after = numbers_in_runs(times) / times[which] * np.append(pauses, 0)[which]
     held = read.where(which)
-    return replace(held, stamps=held.stamps + after)
+    return replace(held, stamps=held.stamps + after.astype(np.int64))
 
 
 def _recorded(

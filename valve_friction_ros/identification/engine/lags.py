@@ -23,6 +23,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from valve_friction_ros.held_signals import SLOW_SAMPLING
 from valve_friction_ros.identification.engine.coordinates import TIMING
 from valve_friction_ros.identification.engine.posterior_fit import PosteriorFit
 from valve_friction_ros.identification.settings import TIMING_UNCERTAINTY
@@ -31,7 +32,7 @@ from valve_friction_ros.model.recording import StampedRecord
 
 _Array = NDArray[np.float64]
 
-LARGEST_LAG = 0.15
+LARGEST_LAG = SLOW_SAMPLING
 _STATED, _OF_RECORD = 3.0, 0.1
 """Largest lag that is possible, s. Where a larger timing uncertainty is stated, the largest lag in
 deviations of it, and at most as a share of the record."""

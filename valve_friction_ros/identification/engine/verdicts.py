@@ -255,12 +255,14 @@ def sampling_remarks(record: StampedRecord) -> tuple[str, ...]:
 def archive_remarks(recording: Recording, held: StampedRecord) -> tuple[str, ...]:
     """Name the signals of a recording that a historian has interpolated, as they are `held`."""
     words, given = recording.driven_by.words, recording.stamped or recording
-    pairs = ((f"the {words}", given.drive, held.drive), ("the stem", given.position, held.position))
     changed = []
-    for name, one, other in pairs:
+    for name, one, other in (
+        (f"the {words}", given.drive, held.drive.value),
+        ("the stem", given.position, held.position.value),
+    ):
         values = one.value if isinstance(one, StampedSignal) else one
-        is_same = values.size != other.value.size or np.array_equal(values, other.value)
-        changed += [] if is_same else [name]
+        if values.size == other.size and not np.array_equal(values, other):
+            changed.append(name)
     if not changed:
         return ()
     return (
