@@ -492,6 +492,18 @@ class TestTime:
         slow = replace(self.bench(1e3), start_time=1.8e9)
         require_plausible_units(slow, BENCH_VALVE, DEFAULTS)
 
+    def test_a_record_too_short_in_ms_is_in_seconds(self):
+        """80 minutes of a slow stem that seems to lag by minutes would be 4.8 s in ms."""
+        time = np.arange(0.0, 4800.0)
+        pressure = 1e5 + 3e4 * np.sin(2 * np.pi * time / 1200.0)
+        late = 0.01 + 0.005 * np.sin(2 * np.pi * time / 1200.0 - 0.5)
+        for times, is_asked in ((1.0, False), (1.1, True)):
+            recording = Recording(times, pressure, late)
+            if is_asked:
+                assert "ms read as s?" in refusal(recording, BENCH_VALVE)
+            else:
+                require_plausible_units(recording, BENCH_VALVE, DEFAULTS)
+
     @pytest.mark.parametrize("seed", range(3))
     def test_a_slow_loop_does_not_lag(self, seed):
         """Noise in the speed of slow moves is no viscous friction."""

@@ -70,6 +70,10 @@ _DATED = 1e9
 """Start of a record, s, above which it is a date, in 2001 or later, whose unit is known: the same
 date in ms or less would lie beyond the year 33,000. Friction may then hold the stem for minutes."""
 
+_SHORTEST = 5.0
+"""Least duration of a record, s. Chosen: a small valve takes two seconds each way. A shorter record
+in the smaller unit has the right unit, however slowly its stem creeps."""
+
 _ORDER, _WINDOW = 3, 11
 """Order of the derivatives, and their window where the unit of time itself is in doubt, samples."""
 
@@ -125,7 +129,8 @@ def require_plausible_units(
     if len(recording) > _LEAST_SAMPLES:
         speed = _SPEED._replace(possible=(0.0, _TRIP_SPEED))
         problem = _beyond("the stem moves at", _top_speed(recording), speed)
-        if not problem and recording.start_time <= _DATED:
+        may_be_ms = recording.duration * _TIME_CONSTANT.units["ms"] >= _SHORTEST
+        if not problem and may_be_ms and recording.start_time <= _DATED:
             late = _least_time_constant(recording)
             problem = _beyond("the stem lags behind the pressure by", late, _TIME_CONSTANT)
         if problem:
