@@ -120,29 +120,20 @@ _DATE = 9.0
 
 
 class Split(NamedTuple):
-    """A change of friction between two blocks of a series.
-
-    Attributes
-    ----------
-    block : int
-        First block after the change.
-    earliest, latest : float
-        Interval of its time, as in `Moves`, s.
-    size : float
-        Mean of all blocks after the change over the mean of all blocks before.
-    ratio : float
-        Friction after the change over friction before.
-    low, high : float
-        Interval of the ratio.
-    """
+    """A change of friction between two blocks of a series."""
 
     block: int
+    """First block after the change."""
     earliest: float
     latest: float
+    """Interval of its time, as in `Moves`, s."""
     size: float
+    """Mean of all blocks after the change over the mean of all blocks before."""
     ratio: float
+    """Friction after the change over friction before."""
     low: float
     high: float
+    """Interval of the ratio."""
 
     @property
     def is_declared(self) -> bool:

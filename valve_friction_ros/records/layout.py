@@ -69,50 +69,35 @@ class TableSignal:
 
 @dataclass(frozen=True, eq=False)
 class Layout:
-    """Instructions for reading the table `raw`.
-
-    Attributes
-    ----------
-    form : Columns
-        Given and recognized format: with it the next table is read in the same way.
-    first, above : int
-        Row of the first values, numbered as in a spreadsheet, and the number of lines above it.
-    valves : mapping of str to tuple of TableSignal
-        The signals of each valve: its drive, its position, and the opposing pressure if it has one.
-        The name of a single valve is empty.
-    times : mapping of tuple of int to TimeForm
-        Formats of the times by their columns.
-    tag_place : int or None
-        Column of the tags if each row has one value.
-    good : mapping of int to callable
-        Functions that recognize good qualities, by column.
-    texts : tuple of str
-        All texts above the values, and the tags: they may name the valve.
-    kinds : mapping of str to str
-        Recognized kind of each column, by header.
-    questions : tuple of str
-        Open questions on the table, each with the option that answers it.
-    unclear : mapping of str to str
-        Columns that may be a signal, with units, in a file with some signals of a valve.
-    beside : tuple of Layout
-        Layouts of the other files of the valve.
-    """
+    """Instructions for reading the table `raw`."""
 
     raw: RawTable
     form: Columns
+    """Given and recognized format: with it the next table is read in the same way."""
     headers: tuple[str, ...]
     first: int
     above: int
+    """Row of the first values, numbered as in a spreadsheet, and the number of lines above it."""
     valves: Mapping[str, tuple[TableSignal, ...]]
+    """The signals of each valve: its drive, its position, and the opposing pressure if it has one.
+    The name of a single valve is empty."""
     times: Mapping[tuple[int, ...], TimeForm]
+    """Formats of the times by their columns."""
     tag_place: int | None
+    """Column of the tags if each row has one value."""
     good: Mapping[int, Callable[[str], bool]]
+    """Functions that recognize good qualities, by column."""
     decimal: str
     texts: tuple[str, ...]
+    """All texts above the values, and the tags: they may name the valve."""
     kinds: Mapping[str, str]
+    """Recognized kind of each column, by header."""
     questions: tuple[str, ...] = ()
+    """Open questions on the table, each with the option that answers it."""
     unclear: Mapping[str, str] = field(default_factory=dict)
+    """Columns that may be a signal, with units, in a file with some signals of a valve."""
     beside: "tuple[Layout, ...]" = ()
+    """Layouts of the other files of the valve."""
 
     @property
     def is_own(self) -> bool:
