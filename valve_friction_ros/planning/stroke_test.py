@@ -309,20 +309,14 @@ class Pattern:
 
 @dataclass(frozen=True, eq=False)
 class StrokeTest:
-    """The pressure of a stroke test: linear between corners.
-
-    Attributes
-    ----------
-    times, pressures : ndarray of float, shape (n,)
-        Times of the corners since the start, s, and the pressures there, Pa.
-    cycles : int
-        Number of times that the stem goes up and down again.
-    """
+    """The pressure of a stroke test: linear between corners."""
 
     times: NDArray[np.float64] = field(repr=False)
     pressures: NDArray[np.float64] = field(repr=False)
+    """Times of the corners since the start, s, and the pressures there, Pa."""
     pattern: Pattern
     cycles: int
+    """Number of times that the stem goes up and down again."""
 
     @property
     def duration(self) -> float:

@@ -45,25 +45,19 @@ def quoted(text: str) -> str:
 
 @dataclass(frozen=True)
 class TableSignal:
-    """Location of a signal in the table `path`: the columns of its values, times and qualities.
-
-    Attributes
-    ----------
-    quantity, name : str
-        ``position``, ``pressure`` or ``force``; and the header, or the tag if each row has one
-        value.
-    place, quality : int
-        Columns of the values and of the qualities, if there are any.
-    time : tuple of int
-        Column of the times, or columns of days and times of day.
-    """
+    """Location of a signal in the table `path`: the columns of its values, times and qualities."""
 
     quantity: str
+    """``position``, ``pressure`` or ``force``."""
     name: str
+    """The header, or the tag if each row has one value."""
     unit: str
     place: int
+    """Column of the values."""
     time: tuple[int, ...]
+    """Column of the times, or columns of days and times of day."""
     quality: int | None = None
+    """Column of the qualities, if there are any."""
     path: Path = Path()
 
 

@@ -56,26 +56,17 @@ the steps elsewhere: neither stem nor actuator moves so for one sample. Chosen."
 
 @dataclass(eq=False)
 class ReadSignal:
-    """The samples of a signal as read, in the unit of the table.
-
-    Attributes
-    ----------
-    signal : TableSignal
-        Location of the signal in the table.
-    stamps, values, rows : ndarray, shape (n,)
-        Times, ns, values, and rows numbered as in a spreadsheet.
-    bad : Counter of str
-        Number of omitted entries by kind.
-    example : tuple of int, str and str
-        Row, column and text of the first bad value.
-    """
+    """The samples of a signal as read, in the unit of the table."""
 
     signal: TableSignal
     stamps: NDArray[np.int64]
     values: NDArray[np.float64]
     rows: NDArray[np.int64]
+    """Times, ns, values, and rows numbered as in a spreadsheet."""
     bad: Counter[str] = field(default_factory=Counter)
+    """Number of omitted entries by kind."""
     example: tuple[int, str, str] = (0, "", "")
+    """Row, column and text of the first bad value."""
 
     def where(self, kept: NDArray[np.bool_] | slice) -> "ReadSignal":
         """Return the selected samples."""
