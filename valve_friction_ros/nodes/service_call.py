@@ -61,11 +61,6 @@ class PatientRequest:
         Name of the service.
     request : message
         The request.
-
-    Attributes
-    ----------
-    answer : message or None
-        The answer, once received.
     """
 
     def __init__(self, node: Node, kind: type, name: str, request: Any) -> None:
@@ -124,13 +119,6 @@ class TriggerCall:
         Parameters of the node to set atomically before the call; they apply to this call.
     switch : bool, optional
         Value for a SetBool service; None: call a Trigger service.
-
-    Attributes
-    ----------
-    answer : Trigger.Response or None
-        The answer, once received.
-    future : Future or None
-        The future answer, once the service has been called.
     """
 
     def __init__(
@@ -152,6 +140,7 @@ class TriggerCall:
         self._client: Any = None
         self._greeting: PatientRequest | None = None
         self.future: Any = None
+        """The future answer, once the service has been called."""
 
     def step(self) -> bool:
         """Continue the call; return whether it has been answered.

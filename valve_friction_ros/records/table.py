@@ -341,24 +341,17 @@ def layout_of(path: Path, form: Columns, is_part: bool = False) -> Layout:
 
 
 class OpenTables:
-    """The table of a recording, or several tables with the signals of one valve.
-
-    Attributes
-    ----------
-    name : str
-        All files, for messages.
-    given : Columns
-        The format as given, before recognition.
-    layout : Layout
-        Common layout with the signals of all tables.
-    """
+    """The table of a recording, or several tables with the signals of one valve."""
 
     def __init__(self, paths: Sequence[Path], form: Columns) -> None:
         self.given = form
+        """The format as given, before recognition."""
         layouts = [layout_of(path, form, len(paths) > 1) for path in paths]
         self._layouts = dict(zip(paths, layouts, strict=True))
         self.name = ", ".join(map(str, self._layouts))
+        """All files, for messages."""
         self.layout = layouts[0] if len(layouts) == 1 else _joined(layouts)
+        """Common layout with the signals of all tables."""
 
     def require_settled(self) -> None:
         """Raise ValueError, with all open questions in one line, if the files leave any."""
