@@ -40,10 +40,6 @@ from valve_friction_ros.health.levels import Level
 from valve_friction_ros.outside_text import is_loopback
 
 
-def _now() -> datetime:
-    return datetime.now(timezone.utc)
-
-
 class Letter(Protocol):
     """A message to post: a change of level, or one without a level."""
 
@@ -92,7 +88,7 @@ class Alert:
     ne_107: str
     message: str
     friction_ratio: float | None = None
-    time: datetime = field(default_factory=_now)
+    time: datetime = field(default_factory=lambda: datetime.now(timezone.utc))
     event_id: str = field(default_factory=lambda: uuid.uuid4().hex)
     alarms: Mapping[str, str] = field(default_factory=dict)
 

@@ -68,42 +68,29 @@ class _Of(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Setting:
-    """One setting.
-
-    Attributes
-    ----------
-    initial : bool, int, float, str, list of str, or where to find it
-        Default; it fixes the type. None: a number that is unset until a value is given; nan also
-        means unset. A default of the integer 0 means "not given".
-    limits : tuple of float, optional
-        Lowest and highest value. Absent for a number that may be nan or infinite, because ROS
-        treats nan as outside any range; the value types still check it.
-    read_only : bool
-        Whether it can only be given at start. Anyone on the ROS graph can change the others, so all
-        addresses, folders and limits of disk space are read-only.
-    choices : tuple of str
-        Permitted values of a text; empty: any.
-    option : str
-        Option of the commands that identify; empty: none.
-    is_assumed : bool
-        Whether the default is only assumed until a value is given; the results report this.
-    spell : callable
-        Converts a text to its present spelling.
-    name : str
-        Name of the parameter, and key of a valve file.
-    description : str
-        Meaning, with the unit in brackets; [-] for none.
-    """
+    """One setting."""
 
     initial: bool | float | str | list[str] | _Of | None
+    """Default, or where to find it; it fixes the type. None: a number that is unset until a value
+    is given; nan also means unset. A default of the integer 0 means "not given"."""
     limits: tuple[float, float] | None = None
+    """Lowest and highest value. Absent for a number that may be nan or infinite, because ROS treats
+    nan as outside any range; the value types still check it."""
     read_only: bool = False
+    """Whether it can only be given at start. Anyone on the ROS graph can change the others, so all
+    addresses, folders and limits of disk space are read-only."""
     choices: tuple[str, ...] = ()
+    """Permitted values of a text; empty: any."""
     option: str = ""
+    """Option of the commands that identify; empty: none."""
     is_assumed: bool = False
+    """Whether the default is only assumed until a value is given; the results report this."""
     spell: Callable[[str], str] = str
+    """Converts a text to its present spelling."""
     name: str = ""
+    """Name of the parameter, and key of a valve file."""
     description: str = ""
+    """Meaning, with the unit in brackets; [-] for none."""
 
     @cached_property
     def _value(self) -> Any:

@@ -64,14 +64,12 @@ class Usage:
     histogram: tuple[int, ...] = (0,) * BINS
 
     def __post_init__(self) -> None:
-        """Refuse impossible numbers."""
         for name in ("distance", "reversals", "breakaways"):
             require_non_negative(name, getattr(self, name))
         if len(self.histogram) != BINS or min(self.histogram) < 0:
             raise ValueError(f"the histogram must have {BINS} times of at least 0 ns")
 
     def __add__(self, other: "Usage") -> "Usage":
-        """Return the sum of two usages."""
         return Usage(
             self.distance + other.distance,
             self.reversals + other.reversals,
@@ -574,7 +572,6 @@ class UsageLimits:
     reversals: float = 0.0
 
     def __post_init__(self) -> None:
-        """Refuse negative limits."""
         require_non_negative("travel_limit", self.travel)
         require_non_negative("reversal_limit", self.reversals)
 

@@ -324,7 +324,6 @@ class Statement:
         return hash((self.code, frozenset(self.facts.items())))
 
     def __str__(self) -> str:
-        """Return its sentence."""
         return sentence(self)
 
 

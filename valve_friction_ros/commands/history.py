@@ -7,7 +7,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Sub-command `history`: list, export and plot the history stored by the identifiers."""
+"""Sub-commands `history` and `history copy`: list, export, plot and copy what is stored."""
 
 import argparse
 import json
@@ -28,12 +28,14 @@ from valve_friction_ros.commands.process import ExitCode
 from valve_friction_ros.health.diagnosis import FrictionState
 from valve_friction_ros.history import (
     AlarmRecording,
+    CopiedPart,
     History,
     HistoryEntry,
     KeptBaseline,
     KeptValve,
     Trend,
     ValveHistory,
+    copied,
     read_usage,
     valve_histories,
 )
@@ -406,3 +408,26 @@ def run(options: argparse.Namespace) -> int:
             figures.save_picture(figure, options.plot)
     levels = (history.entries[-1].diagnosis.level for history in histories)
     return ExitCode.ALARM if has_failed(options, levels) else ExitCode.DONE
+
+
+def _print_parts(parts: tuple[CopiedPart, ...]) -> None:
+    print(f"{'table':<20}{'rows':>10}{'written':>10}{'same':>10}  checksum")
+    for one in parts:
+        verdict = one.checksum[:12] if one.is_same else f"{one.checksum[:12]} ≠ {one.copied[:12]}"
+        print(f"{one.table:<20}{one.rows:>10}{one.written:>10}{one.same:>10}  {verdict}")
+
+
+def copy(options: argparse.Namespace) -> int:
+    """Copy the history, and print the result table by table."""
+    valves = History(options.source).valves()
+    names = [one.name for one in chosen_valves(valves, options.valve, "--valve")]
+    parts = copied(options.source, options.target, names)
+    is_same = all(one.is_same for one in parts)
+    if options.json:
+        tables = {one.table: {**one._asdict(), "is_same": one.is_same} for one in parts}
+        print(json.dumps({"valves": names, "tables": tables, "is_same": is_same}))
+    else:
+        _print_parts(parts)
+        words = "all rows are the same" if is_same else "rows differ"
+        print(f"{len(names)} valves: {words} in {options.source} and {options.target}")
+    return ExitCode.DONE if is_same else ExitCode.PARTLY

@@ -53,7 +53,6 @@ from valve_friction_ros.wording import in_zone
 
 
 def _baseline_from(options: argparse.Namespace) -> Baseline | None:
-    """Build the baseline from the parsed arguments."""
     friction, width = options.baseline_coulomb_friction, options.baseline_half_width
     if options.baseline_recording is not None and (friction, width) != (None, None):
         raise ValueError("--baseline-recording provides the baseline: give no other baseline")

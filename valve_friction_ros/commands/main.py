@@ -14,7 +14,6 @@ import difflib
 import importlib
 import logging
 import os
-import re
 import signal
 import sys
 from collections.abc import Sequence
@@ -50,7 +49,8 @@ SUB_COMMANDS = {
     "demo": "tighten the packing of a monitored simulated valve",
 }
 """Line in ``--help`` of each sub-command. ``identify-folder`` is `run` of the module
-`identify_folder`: it takes the parsed options and returns the exit code."""
+`identify_folder`, ``history copy`` is `copy` of `history`: they take the parsed options and return
+the exit code."""
 
 
 def _chosen(arguments: Sequence[str]) -> tuple[str, list[str]]:
@@ -85,9 +85,10 @@ def _run(name: str, arguments: Sequence[str]) -> int:
     options = parser.parse_args(arguments, argparse.Namespace(command=name))
     package, _, _ = __name__.rpartition(".")
     try:
-        module = importlib.import_module(f"{package}.{re.sub('[- ]', '_', name)}")
+        command, _, action = name.replace("-", "_").partition(" ")
+        run_command = getattr(importlib.import_module(f"{package}.{command}"), action or "run")
         let_interrupt_raise()
-        code: int = module.run(options)
+        code: int = run_command(options)
     except ImportError as error:
         from valve_friction_ros.nodes.start import lack_of_ros  # noqa: PLC0415 - rarely
 

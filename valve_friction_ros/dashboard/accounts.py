@@ -62,13 +62,6 @@ class HashedPassword:
     Its text form is ``scrypt:14:8:5:SALT:DIGEST``: log₂ N, r, p, and salt and digest in base64. No
     character in it is special to a shell.
 
-    Attributes
-    ----------
-    cost, block, parallel : int
-        log₂ N, r and p of scrypt.
-    salt, digest : bytes
-        The salt hashed with the password, and the result.
-
     Raises
     ------
     ValueError
@@ -78,8 +71,10 @@ class HashedPassword:
     cost: int
     block: int
     parallel: int
+    """log₂ N, r and p of scrypt."""
     salt: bytes = field(repr=False)
     digest: bytes = field(repr=False)
+    """The salt hashed with the password, and the result."""
 
     def __post_init__(self) -> None:
         """Refuse an invalid hash, or one that would exhaust the machine's memory."""
@@ -168,15 +163,6 @@ class Account:
 
     Its text form is ``NAME ROLE HASH``, a line of the accounts file.
 
-    Attributes
-    ----------
-    name : str
-        Letters, digits and ``_.@+-``, 64 at most.
-    role : Role
-        Permission of the account.
-    password : HashedPassword
-        Hash of the password.
-
     Raises
     ------
     ValueError
@@ -184,11 +170,11 @@ class Account:
     """
 
     name: str
+    """Letters, digits and ``_.@+-``, 64 at most."""
     role: Role
     password: HashedPassword
 
     def __post_init__(self) -> None:
-        """Refuse an invalid name."""
         if not _NAME.fullmatch(self.name):
             raise ValueError("an account name must have 1 to 64 letters, digits or _.@+-")
 
@@ -252,22 +238,6 @@ def accounts_from(
 class Access:
     """Address, names, accounts and certificate of a dashboard.
 
-    Attributes
-    ----------
-    host : str
-        Address to listen on; ``0.0.0.0`` means all IPv4 addresses.
-    host_names : tuple of str
-        Host names for browsers, besides the addresses and ``localhost``. Other names are refused,
-        since the name of a foreign page can resolve to this host.
-    accounts : tuple of Account
-        Accounts that may log in. Without accounts, anybody who reaches the address may operate.
-    certificate, key : Path or None
-        Files for TLS, in PEM.
-    session_hours : float
-        Duration of a session, h.
-    session_file : Path or None
-        File that keeps sessions across a restart; without it a restart ends them.
-
     Raises
     ------
     ValueError
@@ -278,12 +248,18 @@ class Access:
     """
 
     host: str = "127.0.0.1"
+    """Address to listen on; ``0.0.0.0`` means all IPv4 addresses."""
     host_names: tuple[str, ...] = ()
+    """Host names for browsers, besides the addresses and ``localhost``. Other names are refused,
+    since the name of a foreign page can resolve to this host."""
     accounts: tuple[Account, ...] = ()
+    """Accounts that may log in. Without accounts, anybody who reaches the address may operate."""
     certificate: Path | None = None
     key: Path | None = None
+    """Files for TLS, in PEM."""
     session_hours: float = 12.0
     session_file: Path | None = None
+    """File that keeps sessions across a restart; without it a restart ends them."""
 
     def __post_init__(self) -> None:
         """Refuse options that would let anybody in."""

@@ -83,7 +83,6 @@ class DashboardOptions:
     silence: float = 5.0
 
     def __post_init__(self) -> None:
-        """Refuse impossible options."""
         if not 0 < self.port < 65536:
             raise ValueError(f"port {self.port} is impossible: give one from 1 to 65535")
         zone_of(self.time_zone)
@@ -155,32 +154,19 @@ class DashboardContext:
 
     A request needs permission at that moment. One on an alarm carries the name of the logged-in
     account, whatever the page says.
-
-    Attributes
-    ----------
-    options : DashboardOptions
-        Options of the dashboard.
-    plant : Plant
-        Live state of the valves.
-    history : HistoryCache
-        History of the valves.
-    visitors : Guard
-        Knows the visitor and the visitor's permission.
-    log : callable
-        Takes a line for each call by a visitor with an account.
-    services : callable or None
-        Calls the services of identifiers; None if none is heard and there is only the history.
-    signals : Signals or None
-        Receives the signals of valves.
     """
 
     options: DashboardOptions
     plant: Plant
     history: HistoryCache
     visitors: "Guard"
+    """Knows the visitor and the visitor's permission."""
     log: Callable[[str], None]
+    """Takes a line for each call by a visitor with an account."""
     services: Services | None = None
+    """Calls the services of identifiers; None if none is heard and there is only the history."""
     signals: Signals | None = None
+    """Receives the signals of valves."""
 
     @property
     def is_live(self) -> bool:

@@ -286,7 +286,6 @@ class Gate:
         return response
 
     def _refused(self, name: str, address: str, there: str, wait: int) -> Response:
-        """Refuse a log-in."""
         why = "too many attempts" if wait > 0 else "wrong name or password"
         shown = printable(name, _LONGEST_NAME)
         self._log_refusal(f"refused log-in of {shown!r} from {printable(address)}: {why}")

@@ -40,26 +40,18 @@ class Entry(NamedTuple):
 
 
 class Quantity(NamedTuple):
-    """A number with its interval.
-
-    Attributes
-    ----------
-    name : str
-        Name of the number, as in the keys.
-    value, half_width : float
-        The number, and half the width of its 95 % interval, in `unit`; nan if unknown.
-    unit : str
-        Unit; empty for a pure number.
-    verdict, reason : str
-        Whether the record determines the number, and if not, why; empty if not stated.
-    """
+    """A number with its interval."""
 
     name: str
+    """Name of the number, as in the keys."""
     value: float
     half_width: float = math.nan
+    """The number, and half the width of its 95 % interval, in `unit`; nan if unknown."""
     unit: str = ""
+    """Unit; empty for a pure number."""
     verdict: str = ""
     reason: str = ""
+    """Whether the record determines the number, and if not, why; empty if not stated."""
 
     @property
     def is_known(self) -> bool:
@@ -194,63 +186,39 @@ class Drift(NamedTuple):
 
 @dataclass(frozen=True)
 class ValveView:
-    """The state of one valve as a dashboard shows it.
-
-    Attributes
-    ----------
-    node : str
-        Fully qualified name of the identifier, unique per valve.
-    tag : str
-        Tag of the valve in the plant.
-    level : Level or None
-        Severity; None if unknown.
-    signal : StatusSignal
-        Status signal of NAMUR NE 107.
-    sentence : str
-        The diagnosis in words.
-    reason : str
-        Why there is no estimate; empty with an estimate.
-    identified : int or None
-        Time of the estimate, ns since 1970 (UTC).
-    ratio : Ratio or None
-        Friction over baseline.
-    dead_band : Quantity
-        Dead band of the stem, % of the travel.
-    parameters : tuple of Quantity
-        The identified parameters.
-    baseline : tuple of Quantity
-        Frictions of the baseline; empty without a baseline.
-    drift : Drift or None
-        A significant drift.
-    sources : StreamNames
-        Topics of its samples.
-    alarms : tuple of Alarm
-        Its alarms that are not normal.
-    lacks : tuple of BaselineLack
-        Conditions of a baseline that the valve does not meet now.
-    survey : str
-        Result of the first survey: good, watch or bad; empty without a result.
-    values : mapping of str to str
-        All values as received.
-    """
+    """The state of one valve as a dashboard shows it."""
 
     node: str
+    """Fully qualified name of the identifier, unique per valve."""
     tag: str
     level: Level | None = None
+    """Severity; None if unknown."""
     signal: StatusSignal = StatusSignal.GOOD
     sentence: str = ""
+    """The diagnosis in words."""
     reason: str = ""
+    """Why there is no estimate; empty with an estimate."""
     identified: int | None = None
+    """Time of the estimate, ns since 1970 (UTC)."""
     ratio: Ratio | None = None
+    """Friction over baseline."""
     dead_band: Quantity = Quantity("dead_band", math.nan, unit="%")  # noqa: RUF009 - a tuple
+    """Dead band of the stem, % of the travel."""
     parameters: tuple[Quantity, ...] = ()
     baseline: tuple[Quantity, ...] = ()
+    """Frictions of the baseline; empty without a baseline."""
     drift: Drift | None = None
+    """A significant drift."""
     sources: StreamNames = StreamNames()  # noqa: RUF009 - a tuple
+    """Topics of its samples."""
     alarms: tuple[Alarm, ...] = ()
+    """Its alarms that are not normal."""
     lacks: tuple[BaselineLack, ...] = ()
+    """Conditions of a baseline that the valve does not meet now."""
     survey: str = ""
+    """Result of the first survey: good, watch or bad; empty without a result."""
     values: Mapping[str, str] = field(default_factory=dict, repr=False, compare=False)
+    """All values as received."""
 
     @property
     def namespace(self) -> str:
@@ -454,27 +422,17 @@ _TIDYING = 60.0
 
 @dataclass(frozen=True)
 class Heard:
-    """A valve and the age of its last message.
-
-    Attributes
-    ----------
-    number : int
-        Number of the valve in this run of the dashboard.
-    view : ValveView
-        State of the valve.
-    silent_for : float or None
-        Time since its last message, s; None before the first message.
-    is_silent : bool
-        Whether that time is too long.
-    revision : int
-        Count that grows with each change of the valve's row in a table.
-    """
+    """A valve and the age of its last message."""
 
     number: int
+    """Number of the valve in this run of the dashboard."""
     view: ValveView
     silent_for: float | None
+    """Time since its last message, s; None before the first message."""
     is_silent: bool
+    """Whether that time is too long."""
     revision: int = 0
+    """Count that grows with each change of the valve's row in a table."""
 
 
 class _Valve:

@@ -382,23 +382,15 @@ class ComparedIdentification:
 
 @dataclass(frozen=True)
 class Difference:
-    """A parameter on both sides.
-
-    Attributes
-    ----------
-    name : str
-        Name of the parameter.
-    one, other : Quantity
-        The parameter on either side, without a value if missing.
-    ratio, half_width : float
-        `other` over `one`, and half the width of its 95 % interval; nan if unknown.
-    """
+    """A parameter on both sides."""
 
     name: str
     one: Quantity
     other: Quantity
+    """The parameter on either side, without a value if missing."""
     ratio: float
     half_width: float
+    """`other` over `one`, and half the width of its 95 % interval; nan if unknown."""
 
     @property
     def verdict(self) -> str:

@@ -104,33 +104,24 @@ class Design:
     The unknowns are the spring constant (N/m), the change of friction with speed (N·s/m) and along
     the travel (N/m), the static friction (N), the preload (N) at the mean position, its deviations
     by epoch, and last one or several sliding frictions (N).
-
-    Attributes
-    ----------
-    dense : ndarray of float, shape (n, 5)
-        Regressors of the unknowns up to `PRELOAD`.
-    epoch, group : ndarray of int, shape (n,)
-        Index of the preload deviation and of the sliding friction in each row.
-    way : ndarray of float, shape (n,)
-        Regressor of the sliding friction: ±1, or 0 for a breakaway.
-    force, weight, rate : ndarray of float, shape (n,)
-        Force, N; weight, mean 1; and rate of the force, N/s.
-    epochs, groups : int
-        Number of preload deviations, 0 without any, and of sliding frictions.
-    step : float
-        Largest step of the preload, N; 0 without any.
     """
 
     dense: NDArray[np.float64]
+    """Regressors of the unknowns up to `PRELOAD`, shape (n, 5); n is the number of rows."""
     epoch: NDArray[np.intp]
     group: NDArray[np.intp]
+    """Index of the preload deviation and of the sliding friction in each row."""
     way: NDArray[np.float64]
+    """Regressor of the sliding friction: ±1, or 0 for a breakaway."""
     force: NDArray[np.float64]
     weight: NDArray[np.float64]
     rate: NDArray[np.float64]
+    """Force, N; weight, mean 1; and rate of the force, N/s."""
     epochs: int
     groups: int
+    """Number of preload deviations, 0 without any, and of sliding frictions."""
     step: float = 0.0
+    """Largest step of the preload, N; 0 without any."""
 
     @property
     def shared(self) -> int:
@@ -190,16 +181,13 @@ class Normal(NamedTuple):
     """Normal equations of s shared unknowns and g sliding frictions.
 
     No row contains two frictions. They are eliminated first, so hundreds of frictions cost little.
-
-    Attributes
-    ----------
-    shared, mixed, friction : ndarray of float, shapes (s, s), (s, g), (g,)
-        Blocks of the matrix; the block of the frictions is diagonal.
     """
 
     shared: NDArray[np.float64]
     mixed: NDArray[np.float64]
     friction: NDArray[np.float64]
+    """Blocks of the matrix, shapes (s, s), (s, g) and (g,): the block of the frictions is
+    diagonal."""
 
     def solved(self, right: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the unknowns, shape (p,)."""
@@ -448,41 +436,29 @@ positions, it is an error of the spring constant."""
 
 @dataclass(frozen=True, eq=False)
 class Balance:
-    """Estimate of the unknowns, with its covariance.
-
-    Attributes
-    ----------
-    values : ndarray of float, shape (p,)
-        Spring constant (N/m), change of friction with speed (N·s/m) and along the travel (N/m),
-        static friction (N), preload (N) at `place`, its deviations by epoch, and last the sliding
-        friction (N).
-    scatter : ndarray of float, shape (p, p)
-        Covariance from the scatter of blocks and from the priors.
-    systematic : ndarray of float, shape (p, p)
-        Covariance from the lag of the signals and from errors that no scatter shows.
-    quantile : float
-        Half width of a 95 % interval over the standard error, for the scatter.
-    speed : float
-        Speed to which the sliding friction applies, ∫|v|·|dx| / ∫|dx| of all moves, m/s.
-    place : float
-        Mean position of the moves, m.
-    onsets : int
-        Number of moves that began at rest.
-    timing : float
-        Standard deviation of the lag between the signals, s.
-    lag : ndarray of float, shape (p,)
-        Change of the values for a lag of 1 s.
-    """
+    """Estimate of the unknowns, with its covariance."""
 
     values: NDArray[np.float64]
+    """Spring constant (N/m), change of friction with speed (N·s/m) and along the travel (N/m),
+    static friction (N), preload (N) at `place`, its deviations by epoch, and last the sliding
+    friction (N): shape (p,)."""
     scatter: NDArray[np.float64]
+    """Covariance from the scatter of blocks and from the priors, shape (p, p)."""
     systematic: NDArray[np.float64]
+    """Covariance from the lag of the signals and from errors that no scatter shows, shape (p,
+    p)."""
     quantile: float
+    """Half width of a 95 % interval over the standard error, for the scatter."""
     speed: float
+    """Speed to which the sliding friction applies, ∫|v|·|dx| / ∫|dx| of all moves, m/s."""
     place: float
+    """Mean position of the moves, m."""
     onsets: int
+    """Number of moves that began at rest."""
     timing: float
+    """Standard deviation of the lag between the signals, s."""
     lag: NDArray[np.float64]
+    """Change of the values for a lag of 1 s, shape (p,)."""
 
     def number(self, slope: NDArray[np.float64]) -> tuple[float, float]:
         """Return standard error and half width of a number from its derivatives by the values."""

@@ -57,25 +57,18 @@ from valve_friction_ros.wording import numbered, percentage
 
 @dataclass(frozen=True, eq=False)
 class Series:
-    """Sliding friction by block, at one speed and one position.
-
-    Attributes
-    ----------
-    begin, end : ndarray of float, shape (b,)
-        Times of the first and the last move of each block, as in `Moves`, s.
-    friction : ndarray of float, shape (b,)
-        Sliding friction, N.
-    covariance : ndarray of float, shape (b, b)
-        Covariance from the scatter of moves, and from what speed and position leave undetermined.
-    first : ndarray of int, shape (b,)
-        First move of each block.
-    """
+    """Sliding friction by block, at one speed and one position."""
 
     begin: NDArray[np.float64]
     end: NDArray[np.float64]
+    """Times of the first and the last move of each block, as in `Moves`, s, shape (b,)."""
     friction: NDArray[np.float64]
+    """Sliding friction, N, shape (b,)."""
     covariance: NDArray[np.float64]
+    """Covariance from the scatter of moves, and from what speed and position leave undetermined,
+    shape (b, b)."""
     first: NDArray[np.intp]
+    """First move of each block, shape (b,)."""
 
 
 def series_of(moves: Moves, travel: float) -> Series | None:
@@ -120,29 +113,20 @@ _DATE = 9.0
 
 
 class Split(NamedTuple):
-    """A change of friction between two blocks of a series.
-
-    Attributes
-    ----------
-    block : int
-        First block after the change.
-    earliest, latest : float
-        Interval of its time, as in `Moves`, s.
-    size : float
-        Mean of all blocks after the change over the mean of all blocks before.
-    ratio : float
-        Friction after the change over friction before.
-    low, high : float
-        Interval of the ratio.
-    """
+    """A change of friction between two blocks of a series."""
 
     block: int
+    """First block after the change."""
     earliest: float
     latest: float
+    """Interval of its time, as in `Moves`, s."""
     size: float
+    """Mean of all blocks after the change over the mean of all blocks before."""
     ratio: float
+    """Friction after the change over friction before."""
     low: float
     high: float
+    """Interval of the ratio."""
 
     @property
     def is_declared(self) -> bool:

@@ -77,7 +77,6 @@ class Move:
     onset_rate: float = math.nan
 
     def __post_init__(self) -> None:
-        """Refuse impossible numbers."""
         if not self.begin < self.end:
             raise ValueError(f"a move must end after it begins, got {self.begin} to {self.end} ns")
         for name in ("start", "stop", "force", "force_rate"):
@@ -142,11 +141,9 @@ class Moves:
         return cls(*rows.T)
 
     def __len__(self) -> int:
-        """Count the moves."""
         return self.time.size
 
     def __getitem__(self, chosen: slice | NDArray[np.bool_] | NDArray[np.intp]) -> "Moves":
-        """Return a selection of the moves."""
         return Moves(*(getattr(self, field.name)[chosen] for field in fields(self)))
 
 

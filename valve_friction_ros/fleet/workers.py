@@ -66,7 +66,6 @@ class DeadWorker:
     cause: str
 
     def __str__(self) -> str:
-        """Return the cause."""
         return self.cause
 
 
@@ -214,7 +213,6 @@ class _Call:
         self._call = (function, arguments)
 
     def __reduce__(self) -> tuple[Callable[..., Any], tuple[object, ...]]:
-        """Return the call."""
         return self._call
 
 

@@ -207,7 +207,6 @@ class Alarm:
     message: str = ""
 
     def __post_init__(self) -> None:
-        """Refuse an alarm that contradicts itself."""
         if self.state.is_suppressed != (self.until is not None):
             raise ValueError(f"an alarm that is {self.state.value} until {self.until}")
         shows = self.is_active
@@ -292,7 +291,6 @@ class AlarmRequest:
     duration: float = math.nan
 
     def __post_init__(self) -> None:
-        """Refuse invalid requests."""
         if not self.action.is_of_person:
             raise AlarmError(f"an alarm is {self.action.value} by the valve, not by request")
         for name, longest in (("who", _LONGEST_NAME), ("text", _LONGEST_TEXT)):

@@ -123,7 +123,6 @@ class SlidingFriction:
     speed: float
 
     def __post_init__(self) -> None:
-        """Refuse impossible values."""
         require_positive("sliding_friction", self.value)
         require_non_negative("half_width", self.half_width)
         require_positive("sliding_speed", self.speed)
@@ -176,7 +175,6 @@ class Baseline:
     numbers: Mapping[str, Measured] = field(default_factory=dict, compare=False)
 
     def __post_init__(self) -> None:
-        """Refuse a baseline that is not above zero."""
         if self.coulomb_friction is not None:
             require_positive("baseline_coulomb_friction", self.coulomb_friction)
         elif self.sliding is None:

@@ -76,7 +76,6 @@ class FrictionLimits:
     survey: SurveyLimits = field(default_factory=SurveyLimits, compare=False)
 
     def __post_init__(self) -> None:
-        """Refuse limits that are out of order."""
         if not 0 < self.low_ratio < 1 < self.warn_ratio < self.error_ratio:
             raise ValueError(
                 "limits must satisfy 0 < low_ratio < 1 < warn_ratio < error_ratio, got low_ratio "

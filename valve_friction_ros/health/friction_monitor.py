@@ -146,7 +146,6 @@ class MonitorSettings:
     valve_limits: ValveLimits = field(default_factory=ValveLimits)
 
     def __post_init__(self) -> None:
-        """Refuse impossible windows and unknown methods."""
         method_named(self.method)
         object.__setattr__(self, "method", current_name(self.method))
         require_positive("window", self.window)

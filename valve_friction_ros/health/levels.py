@@ -66,7 +66,6 @@ class SurveyLimits:
         return cls(usual.watch if watch is None else watch, usual.bad if bad is None else bad)
 
     def __post_init__(self) -> None:
-        """Refuse limits that are out of order."""
         if not 0 < self.watch < self.bad:
             raise ValueError(
                 "limits must satisfy 0 < survey_watch < survey_bad, got survey_watch "

@@ -84,7 +84,6 @@ class ValveLimits:
     lag_change: float = 0.02
 
     def __post_init__(self) -> None:
-        """Refuse impossible limits."""
         for name in (one.name for one in fields(self)):
             least = 1.0 if name.endswith("factor") else 0.0
             if not (value := getattr(self, name)) > least:

@@ -124,7 +124,6 @@ def rows_of(connection: Connection, part: sa.Table, chosen: Any) -> Iterator[tup
 def _children(
     connection: Connection, part: sa.Table, rows: Sequence[RowMapping]
 ) -> dict[int, dict[str, list[dict[str, Any]]]]:
-    """Return the children of rows, by row and table."""
     some, owner = _CHILDREN.get(part, ()), f"{part.name}_id"
     found: defaultdict[int, dict[str, list[dict[str, Any]]]] = defaultdict(
         lambda: {table.name: [] for table in some}

@@ -55,21 +55,14 @@ class Span(NamedTuple):
 
 
 class Fit(NamedTuple):
-    """How well a model reproduces its record; nan if unknown.
-
-    Attributes
-    ----------
-    share : float
-        Share of the stem motion that the model reproduces; of the force without a spring.
-    rms : float
-        Distance between simulated and measured stem, m.
-    systematic : float
-        Part of that distance that is not noise, m.
-    """
+    """How well a model reproduces its record; nan if unknown."""
 
     share: float = math.nan
+    """Share of the stem motion that the model reproduces; of the force without a spring."""
     rms: float = math.nan
+    """Distance between simulated and measured stem, m."""
     systematic: float = math.nan
+    """Part of that distance that is not noise, m."""
 
 
 @dataclass(frozen=True)

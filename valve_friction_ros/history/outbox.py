@@ -115,7 +115,6 @@ def _trigger(table: sa.Table, event: str, row: str) -> str:
 
 
 def _queue(file: Connection, some: Iterable[sa.Table]) -> None:
-    """Queue all rows of some tables."""
     now: Any = sa.literal_column(_NOW)
     for table in some:
         key = sa.func.json_array(*key_columns(table))
@@ -238,7 +237,6 @@ def _deliver(path: Path, server: HistoryServer, batch: Sequence[Unsent]) -> None
 
 
 def _rows_of_valves(new: Connection, valves: set[KeptValve]) -> dict[KeptValve, int]:
-    """Return the rows of valves on the server."""
     named = sa.select(tables.valve).where(tables.valve.c.name.in_([one.name for one in valves]))
     known = {KeptValve(row.name, row.tag): row.id for row in new.execute(named)}
     return known | {one: valve_id(new, one) for one in sorted(valves - known.keys())}

@@ -62,29 +62,18 @@ LIMIT_NAMES = {"warn_ratio": "worth maintenance", "error_ratio": "excess", "low_
 
 
 class ScatteredLine(NamedTuple):
-    """A line y = level + slope·(t − centre), with its uncertainty.
-
-    Attributes
-    ----------
-    centre : float
-        Time at which level and slope are uncorrelated.
-    level, slope : float
-        Parameters of the line.
-    level_error, slope_error : float
-        Standard errors of level and slope.
-    scatter : float
-        Standard deviation between estimates beyond their own errors.
-    freedom : int
-        Degrees of freedom.
-    """
+    """A line y = level + slope·(t − centre), with its uncertainty."""
 
     centre: float
+    """Time at which level and slope are uncorrelated."""
     level: float
     slope: float
     level_error: float
     slope_error: float
     scatter: float
+    """Standard deviation between estimates beyond their own errors."""
     freedom: int
+    """Degrees of freedom."""
 
     @property
     def quantile(self) -> float:

@@ -76,7 +76,6 @@ class _FaultyValve(PolledNode):
 
 
 def _places(valves: Sequence[str]) -> list[str]:
-    """Return the namespace of each valve."""
     places = [f"/{valve.strip('/')}" for valve in valves if valve]
     if not places:
         raise ValueError("no valve is named: set the parameter valves, such as [fv_101, fv_102]")

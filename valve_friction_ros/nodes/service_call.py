@@ -20,6 +20,7 @@ import os
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import rclpy
@@ -61,11 +62,6 @@ class PatientRequest:
         Name of the service.
     request : message
         The request.
-
-    Attributes
-    ----------
-    answer : message or None
-        The answer, once received.
     """
 
     def __init__(self, node: Node, kind: type, name: str, request: Any) -> None:
@@ -105,53 +101,33 @@ def set_parameters_request(node: Node, target: str, values: Mapping[str, Any]) -
     return PatientRequest(node, SetParametersAtomically, name, request)
 
 
+@dataclass(eq=False)
 class TriggerCall:
-    """A single call of a std_srvs/Trigger or SetBool service, never repeated.
+    """A single call of a std_srvs/Trigger or SetBool service, never repeated."""
 
-    Parameters
-    ----------
-    node : Node
-        The calling node; its executor must run between two steps.
-    identifier : str
-        Fully qualified name of the called node.
-    service : str
-        Name of its service, without the node.
-    meeting : float
-        Longest time until the service is discovered, s.
-    patience : float
-        Longest time until the answer, s.
-    values : mapping of str to object, optional
-        Parameters of the node to set atomically before the call; they apply to this call.
-    switch : bool, optional
-        Value for a SetBool service; None: call a Trigger service.
+    node: Node
+    """The calling node; its executor must run between two steps."""
+    identifier: str
+    """Fully qualified name of the called node."""
+    service: str
+    """Name of its service, without the node."""
+    meeting: float
+    """Longest time until the service is discovered, s."""
+    patience: float
+    """Longest time until the answer, s."""
+    values: Mapping[str, Any] | None = None
+    """Parameters of the node to set atomically before the call; they apply to this call."""
+    switch: bool | None = None
+    """Value for a SetBool service; None: call a Trigger service."""
 
-    Attributes
-    ----------
-    answer : Trigger.Response or None
-        The answer, once received.
-    future : Future or None
-        The future answer, once the service has been called.
-    """
-
-    def __init__(
-        self,
-        node: Node,
-        identifier: str,
-        service: str,
-        meeting: float,
-        patience: float,
-        values: Mapping[str, Any] | None = None,
-        switch: bool | None = None,
-    ) -> None:
+    def __post_init__(self) -> None:
         self.answer: Any = None
-        self._values, self._switch = values, switch
-        self._node, self._identifier = node, identifier
-        self._name = f"{identifier}/{service}"
-        self._meeting, self._patience = meeting, patience
+        self.future: Any = None
+        """The future answer, once the service has been called."""
+        self._name = f"{self.identifier}/{self.service}"
         self._begun = time.monotonic()
         self._client: Any = None
         self._greeting: PatientRequest | None = None
-        self.future: Any = None
 
     def step(self) -> bool:
         """Continue the call; return whether it has been answered.
@@ -165,10 +141,10 @@ class TriggerCall:
         if self.future is None:
             if is_there and self._is_known(waited):
                 request = Trigger.Request()
-                if self._switch is not None:
-                    request = SetBool.Request(data=self._switch)
+                if self.switch is not None:
+                    request = SetBool.Request(data=self.switch)
                 self.future = self._client.call_async(request)
-            elif not is_there and waited > self._meeting:
+            elif not is_there and waited > self.meeting:
                 raise UnansweredError(
                     f"{self._name} is not available: start the identifier of this valve"
                 )
@@ -176,26 +152,26 @@ class TriggerCall:
             self.answer = self.future.result()
             return True
         elif not is_there:
-            raise UnansweredError(f"{self._identifier} ended before it answered")
-        if waited > self._patience:
+            raise UnansweredError(f"{self.identifier} ended before it answered")
+        if waited > self.patience:
             raise LateError(
-                f"{self._name} has not answered within {self._patience:g} s; it is still running"
+                f"{self._name} has not answered within {self.patience:g} s; it is still running"
             )
         return False
 
     def _begin(self) -> None:
         """Create the client, then a second client whose answer proves that both are known."""
         try:
-            kind = Trigger if self._switch is None else SetBool
-            self._client = self._node.create_client(kind, self._name)
+            kind = Trigger if self.switch is None else SetBool
+            self._client = self.node.create_client(kind, self._name)
         except Exception as error:  # noqa: BLE001 - rclpy's, where the name is no name of a service
             about = str(error).partition("\n")[0]
             raise UnansweredError(f"{self._name} cannot be called: {about}") from None
-        if self._values:
-            self._greeting = set_parameters_request(self._node, self._identifier, self._values)
+        if self.values:
+            self._greeting = set_parameters_request(self.node, self.identifier, self.values)
             return
         self._greeting = PatientRequest(
-            self._node, GetParameters, f"{self._identifier}/get_parameters", GetParameters.Request()
+            self.node, GetParameters, f"{self.identifier}/get_parameters", GetParameters.Request()
         )
 
     def _is_known(self, waited: float) -> bool:
@@ -204,15 +180,15 @@ class TriggerCall:
         if greeting is None:
             return True
         if greeting.step():
-            if self._values and not greeting.answer.result.successful:
+            if self.values and not greeting.answer.result.successful:
                 raise UnansweredError(greeting.answer.result.reason)
             return True
-        return not self._values and not greeting.is_met() and waited > _NO_PARAMETERS
+        return not self.values and not greeting.is_met() and waited > _NO_PARAMETERS
 
     def close(self) -> None:
         """Destroy the clients; a call that was made continues in the node."""
         if self._client is not None:
-            self._node.destroy_client(self._client)
+            self.node.destroy_client(self._client)
         if self._greeting is not None:
             self._greeting.close()
 

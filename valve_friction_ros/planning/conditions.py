@@ -68,7 +68,6 @@ class Limits:
     allow_stops: bool = False
 
     def __post_init__(self) -> None:
-        """Refuse impossible limits."""
         if not 0 <= self.lowest < self.highest <= 1:
             raise ValueError(
                 "the part of the travel must be given from low to high within 0 to 100 %, got "
@@ -112,7 +111,6 @@ class Conditions:
     converter_lag: float = DEFAULT_LAG
 
     def __post_init__(self) -> None:
-        """Refuse impossible values."""
         require_positive("sample_rate", self.sample_rate)
         require_non_negative("position_noise", self.position_noise)
         require_non_negative("pressure_noise", self.pressure_noise)

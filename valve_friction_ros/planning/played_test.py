@@ -41,17 +41,6 @@ PRESSURE_MARGIN = 1e4
 class PlayLimits:
     """Limits that end a test at once.
 
-    Attributes
-    ----------
-    position : tuple of float
-        Lowest and highest position of the stem, m.
-    pressure : tuple of float
-        Lowest and highest measured pressure, Pa.
-    silence : float
-        Longest time without a sample of either signal, and between two set points, s.
-    duration : float
-        Longest time that a test may take, s.
-
     Raises
     ------
     ValueError
@@ -59,9 +48,13 @@ class PlayLimits:
     """
 
     position: tuple[float, float]
+    """Lowest and highest position of the stem, m."""
     pressure: tuple[float, float]
+    """Lowest and highest measured pressure, Pa."""
     silence: float = 1.0
+    """Longest time without a sample of either signal, and between two set points, s."""
     duration: float = 3600.0
+    """Longest time that a test may take, s."""
 
     def __post_init__(self) -> None:
         """Refuse limits that would never end a test."""

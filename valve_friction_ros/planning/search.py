@@ -50,29 +50,19 @@ _MOST_SAMPLES = 12_000
 
 @dataclass(frozen=True)
 class Forecast:
-    """Forecast for the valve with these `parameters`: its motion, and the intervals.
-
-    Attributes
-    ----------
-    values, half_widths : mapping of str to float
-        True values, and half the widths of their 95 % intervals; SI units. No widths if refused.
-    reach : tuple of float
-        Lowest and highest position, m.
-    top_speed : float
-        Largest speed, m/s.
-    breakaways : int
-        Number of breakaways of the stem.
-    refusal : str
-        Why the identification would refuse the record; empty if it would not.
-    """
+    """Forecast for the valve with these `parameters`: its motion, and the intervals."""
 
     parameters: KarnoppParameters
     values: Mapping[str, float]
     half_widths: Mapping[str, float]
+    """True values, and half the widths of their 95 % intervals; SI units. No widths if refused."""
     reach: tuple[float, float]
+    """Lowest and highest position, m."""
     top_speed: float
+    """Largest speed, m/s."""
     breakaways: int
     refusal: str = ""
+    """Why the identification would refuse the record; empty if it would not."""
 
     def relative(self, name: str) -> float:
         """Half width over the value, inf where either is missing."""

@@ -55,27 +55,19 @@ _STEM_MARGIN = 0.05
 
 @dataclass(frozen=True)
 class SetPoint:
-    """A step of a test: a ramp to a pressure within `duration`.
-
-    Attributes
-    ----------
-    time, duration : float
-        Beginning and length, s.
-    pressure, share : float
-        Pressure at its end, Pa, and the same as a share of the signal's range.
-    stem : tuple of float
-        Shares of the travel between which the stem must be from then on until the next step ends:
-        beyond them the test is aborted.
-    tells : str
-        Purpose.
-    """
+    """A step of a test: a ramp to a pressure within `duration`."""
 
     time: float
     duration: float
+    """Beginning and length, s."""
     pressure: float
     share: float
+    """Pressure at its end, Pa, and the same as a share of the signal's range."""
     stem: tuple[float, float]
+    """Shares of the travel between which the stem must be from then on until the next step ends:
+    beyond them the test is aborted."""
     tells: str
+    """Purpose."""
 
     @property
     def milliamperes(self) -> float:

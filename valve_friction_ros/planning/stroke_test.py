@@ -57,7 +57,6 @@ class FrictionRange:
     names: tuple[str, ...]
 
     def __post_init__(self) -> None:
-        """Refuse valves without a spring."""
         if not self.draws[0].spring_constant > 0:
             raise ValueError("a stroke test needs a spring: give spring_constant above zero")
 
@@ -152,19 +151,13 @@ LEAST_STROKE = 0.03
 
 
 class PressureBand(NamedTuple):
-    """Pressures of a test, and the rate that its speed allows.
-
-    Attributes
-    ----------
-    low, high : float
-        Lowest and highest pressure, Pa.
-    rate : float
-        Largest rate of the pressure, Pa/s.
-    """
+    """Pressures of a test, and the rate that its speed allows."""
 
     low: float
     high: float
+    """Lowest and highest pressure, Pa."""
     rate: float
+    """Largest rate of the pressure, Pa/s."""
 
 
 def _held(one: KarnoppParameters) -> float:
@@ -304,40 +297,26 @@ _SHORTEST_HOLD = 1e-3
 
 @dataclass(frozen=True)
 class Pattern:
-    """The pattern that repeats in a stroke test; each cycle takes the next shape and speed.
-
-    Attributes
-    ----------
-    shapes : tuple of str
-        Names of `SHAPES`.
-    speeds : tuple of float
-        Rates of the pressure, shares of the largest one, above 0 and at most 1.
-    hold : float
-        Time at each level, s.
-
-    """
+    """The pattern that repeats in a stroke test; each cycle takes the next shape and speed."""
 
     shapes: tuple[str, ...]
+    """Names of `SHAPES`."""
     speeds: tuple[float, ...]
+    """Rates of the pressure, shares of the largest one, above 0 and at most 1."""
     hold: float
+    """Time at each level, s."""
 
 
 @dataclass(frozen=True, eq=False)
 class StrokeTest:
-    """The pressure of a stroke test: linear between corners.
-
-    Attributes
-    ----------
-    times, pressures : ndarray of float, shape (n,)
-        Times of the corners since the start, s, and the pressures there, Pa.
-    cycles : int
-        Number of times that the stem goes up and down again.
-    """
+    """The pressure of a stroke test: linear between corners."""
 
     times: NDArray[np.float64] = field(repr=False)
     pressures: NDArray[np.float64] = field(repr=False)
+    """Times of the corners since the start, s, and the pressures there, Pa."""
     pattern: Pattern
     cycles: int
+    """Number of times that the stem goes up and down again."""
 
     @property
     def duration(self) -> float:

@@ -98,7 +98,6 @@ class Columns:
     maximum_megabytes: float = _described(2000.0, "largest size of the file, unpacked", "MB")
 
     def __post_init__(self) -> None:
-        """Refuse impossible values."""
         set_ = object.__setattr__
         set_(self, "delimiter", _DELIMITERS.get(self.delimiter, self.delimiter))
         for quantity, known in KNOWN_UNITS.items():

@@ -58,25 +58,17 @@ _IDLE = frozenset(["pv", "x", "t", "state", "fluid", "msg", "data"])
 
 
 class Named(NamedTuple):
-    """Meaning of a header or a tag.
-
-    Attributes
-    ----------
-    quantity : str
-        ``time``, ``position``, ``pressure``, ``force``, ``command``, ``quality``, ``tag``,
-        ``value``, ``unit``, ``other``, or empty.
-    unit : str
-        Name of the unit in `records.units`, or empty.
-    label : str
-        Rest of the name: the valve.
-    is_strong : bool
-        Whether it refers directly to the actuator or the stem.
-    """
+    """Meaning of a header or a tag."""
 
     quantity: str
+    """``time``, ``position``, ``pressure``, ``force``, ``command``, ``quality``, ``tag``,
+    ``value``, ``unit``, ``other``, or empty."""
     unit: str = ""
+    """Name of the unit in `records.units`, or empty."""
     label: str = ""
+    """Rest of the name: the valve."""
     is_strong: bool = False
+    """Whether it refers directly to the actuator or the stem."""
 
 
 def plain_name(text: str) -> str:

@@ -45,74 +45,53 @@ def quoted(text: str) -> str:
 
 @dataclass(frozen=True)
 class TableSignal:
-    """Location of a signal in the table `path`: the columns of its values, times and qualities.
-
-    Attributes
-    ----------
-    quantity, name : str
-        ``position``, ``pressure`` or ``force``; and the header, or the tag if each row has one
-        value.
-    place, quality : int
-        Columns of the values and of the qualities, if there are any.
-    time : tuple of int
-        Column of the times, or columns of days and times of day.
-    """
+    """Location of a signal in the table `path`: the columns of its values, times and qualities."""
 
     quantity: str
+    """``position``, ``pressure`` or ``force``."""
     name: str
+    """The header, or the tag if each row has one value."""
     unit: str
     place: int
+    """Column of the values."""
     time: tuple[int, ...]
+    """Column of the times, or columns of days and times of day."""
     quality: int | None = None
+    """Column of the qualities, if there are any."""
     path: Path = Path()
 
 
 @dataclass(frozen=True, eq=False)
 class Layout:
-    """Instructions for reading the table `raw`.
-
-    Attributes
-    ----------
-    form : Columns
-        Given and recognized format: with it the next table is read in the same way.
-    first, above : int
-        Row of the first values, numbered as in a spreadsheet, and the number of lines above it.
-    valves : mapping of str to tuple of TableSignal
-        The signals of each valve: its drive, its position, and the opposing pressure if it has one.
-        The name of a single valve is empty.
-    times : mapping of tuple of int to TimeForm
-        Formats of the times by their columns.
-    tag_place : int or None
-        Column of the tags if each row has one value.
-    good : mapping of int to callable
-        Functions that recognize good qualities, by column.
-    texts : tuple of str
-        All texts above the values, and the tags: they may name the valve.
-    kinds : mapping of str to str
-        Recognized kind of each column, by header.
-    questions : tuple of str
-        Open questions on the table, each with the option that answers it.
-    unclear : mapping of str to str
-        Columns that may be a signal, with units, in a file with some signals of a valve.
-    beside : tuple of Layout
-        Layouts of the other files of the valve.
-    """
+    """Instructions for reading the table `raw`."""
 
     raw: RawTable
     form: Columns
+    """Given and recognized format: with it the next table is read in the same way."""
     headers: tuple[str, ...]
     first: int
     above: int
+    """Row of the first values, numbered as in a spreadsheet, and the number of lines above it."""
     valves: Mapping[str, tuple[TableSignal, ...]]
+    """The signals of each valve: its drive, its position, and the opposing pressure if it has one.
+    The name of a single valve is empty."""
     times: Mapping[tuple[int, ...], TimeForm]
+    """Formats of the times by their columns."""
     tag_place: int | None
+    """Column of the tags if each row has one value."""
     good: Mapping[int, Callable[[str], bool]]
+    """Functions that recognize good qualities, by column."""
     decimal: str
     texts: tuple[str, ...]
+    """All texts above the values, and the tags: they may name the valve."""
     kinds: Mapping[str, str]
+    """Recognized kind of each column, by header."""
     questions: tuple[str, ...] = ()
+    """Open questions on the table, each with the option that answers it."""
     unclear: Mapping[str, str] = field(default_factory=dict)
+    """Columns that may be a signal, with units, in a file with some signals of a valve."""
     beside: "tuple[Layout, ...]" = ()
+    """Layouts of the other files of the valve."""
 
     @property
     def is_own(self) -> bool:

@@ -79,7 +79,6 @@ class Stretch:
     last: float = math.inf
 
     def __post_init__(self) -> None:
-        """Refuse empty stretches."""
         if not self.begin < self.end:
             raise ValueError(f"a stretch cannot begin at {self.begin:g} s and end at {self.end:g}")
         if not self.last > 0:

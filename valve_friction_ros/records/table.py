@@ -56,26 +56,17 @@ the steps elsewhere: neither stem nor actuator moves so for one sample. Chosen."
 
 @dataclass(eq=False)
 class ReadSignal:
-    """The samples of a signal as read, in the unit of the table.
-
-    Attributes
-    ----------
-    signal : TableSignal
-        Location of the signal in the table.
-    stamps, values, rows : ndarray, shape (n,)
-        Times, ns, values, and rows numbered as in a spreadsheet.
-    bad : Counter of str
-        Number of omitted entries by kind.
-    example : tuple of int, str and str
-        Row, column and text of the first bad value.
-    """
+    """The samples of a signal as read, in the unit of the table."""
 
     signal: TableSignal
     stamps: NDArray[np.int64]
     values: NDArray[np.float64]
     rows: NDArray[np.int64]
+    """Times, ns, values, and rows numbered as in a spreadsheet."""
     bad: Counter[str] = field(default_factory=Counter)
+    """Number of omitted entries by kind."""
     example: tuple[int, str, str] = (0, "", "")
+    """Row, column and text of the first bad value."""
 
     def where(self, kept: NDArray[np.bool_] | slice) -> "ReadSignal":
         """Return the selected samples."""
@@ -350,24 +341,17 @@ def layout_of(path: Path, form: Columns, is_part: bool = False) -> Layout:
 
 
 class OpenTables:
-    """The table of a recording, or several tables with the signals of one valve.
-
-    Attributes
-    ----------
-    name : str
-        All files, for messages.
-    given : Columns
-        The format as given, before recognition.
-    layout : Layout
-        Common layout with the signals of all tables.
-    """
+    """The table of a recording, or several tables with the signals of one valve."""
 
     def __init__(self, paths: Sequence[Path], form: Columns) -> None:
         self.given = form
+        """The format as given, before recognition."""
         layouts = [layout_of(path, form, len(paths) > 1) for path in paths]
         self._layouts = dict(zip(paths, layouts, strict=True))
         self.name = ", ".join(map(str, self._layouts))
+        """All files, for messages."""
         self.layout = layouts[0] if len(layouts) == 1 else _joined(layouts)
+        """Common layout with the signals of all tables."""
 
     def require_settled(self) -> None:
         """Raise ValueError, with all open questions in one line, if the files leave any."""

@@ -186,21 +186,16 @@ Cells = tuple[NDArray[np.int64], "pd.DataFrame"]
 
 @dataclass(frozen=True, eq=False)
 class RawTable:
-    """The cells of a file before recognition.
-
-    Attributes
-    ----------
-    path, place : Path
-        The file, as named in messages and as it is opened.
-    head, cells : sequence
-        First lines of a text, or first rows of a file of cells; the other is empty.
-    """
+    """The cells of a file before recognition."""
 
     path: Path
+    """The file, as named in messages."""
     form: Columns
     place: Path
+    """The file, as it is opened."""
     head: tuple[str, ...] = ()
     cells: Sequence[Sequence[str]] = ()
+    """First lines of a text, or first rows of a file of cells; the other is empty."""
     encoding: str = ""
 
     @property

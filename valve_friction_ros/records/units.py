@@ -22,15 +22,11 @@ class Unit(NamedTuple):
     """Size of a unit as a ratio, so that decimals are converted with only one rounding.
 
     3.7 mm is 3.7/1000 m to the last bit; 3.7·0.001 m is not.
-
-    Attributes
-    ----------
-    multiplier, divisor : float
-        The unit is multiplier/divisor SI units.
     """
 
     multiplier: float
     divisor: float = 1.0
+    """The unit is multiplier/divisor SI units."""
 
     def to_si(self, values: "NDArray[np.float64]") -> "NDArray[np.float64]":
         """Convert values from this unit to the SI unit."""

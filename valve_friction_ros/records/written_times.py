@@ -105,29 +105,20 @@ def in_one(parts: Sequence[str]) -> str:
 
 @dataclass(frozen=True)
 class TimeForm:
-    """Format of times.
-
-    Attributes
-    ----------
-    formats : tuple of str
-        Formats of dates (strptime), the most frequent first; empty for numbers and durations.
-    zone : str
-        Zone of dates, unless each has its own (`has_zone`), and of numbers in days.
-    unit, origin : str, int
-        Unit of numbers, and their origin, ns since 1970.
-    last : str
-        Unit of the last part of a time of day with two parts, s or min.
-    is_assumed : bool
-        Whether the unit of numbers is neither given nor stated.
-    """
+    """Format of times."""
 
     formats: tuple[str, ...] = ()
+    """Formats of dates (strptime), the most frequent first; empty for numbers and durations."""
     zone: str = ""
+    """Zone of dates, unless each has its own (`has_zone`), and of numbers in days."""
     unit: str = ""
     origin: int = 0
+    """Unit of numbers, and their origin, ns since 1970."""
     has_zone: bool = False
     last: str = "s"
+    """Unit of the last part of a time of day with two parts, s or min."""
     is_assumed: bool = False
+    """Whether the unit of numbers is neither given nor stated."""
 
 
 def date_forms(texts: Sequence[str]) -> tuple[list[tuple[str, ...]], bool]:

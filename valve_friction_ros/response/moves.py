@@ -42,25 +42,17 @@ _Transit = tuple[int, float, float, float]
 
 
 class CommandStep(NamedTuple):
-    """A change of the command, given once the command has reached its next value.
-
-    Attributes
-    ----------
-    stamp : int
-        Start of the change, ns.
-    before, after : float
-        The command before and after, in the unit of the samples.
-    held : float
-        Time for which the command was constant before, s.
-    is_step : bool
-        Whether the command jumped; False for a ramp.
-    """
+    """A change of the command, given once the command has reached its next value."""
 
     stamp: int
+    """Start of the change, ns."""
     before: float
     after: float
+    """The command before and after, in the unit of the samples."""
     held: float
+    """Time for which the command was constant before, s."""
     is_step: bool
+    """Whether the command jumped; False for a ramp."""
 
 
 class CommandHolds:

@@ -257,7 +257,6 @@ class ResponseLimits:
     t86: float = 0.0
 
     def __post_init__(self) -> None:
-        """Refuse negative limits."""
         if min(self.deviation, self.dead_time, self.t86) < 0:
             raise ValueError("limits of the response must not be negative")
 

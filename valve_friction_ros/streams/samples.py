@@ -403,7 +403,6 @@ class Gap:
         )
 
     def __str__(self) -> str:
-        """Return the refusal."""
         if self.bunches and self.is_most:
             return (
                 f"the time stamps of {self.name} come in {self.bunches} bunches, "

@@ -90,30 +90,20 @@ def _state(alarm: Alarm, zone: ZoneInfo) -> str:
 
 @dataclass(frozen=True)
 class AlarmSelection:
-    """Filters of an alarm page.
-
-    Attributes
-    ----------
-    is_journal : bool
-        Whether to list all events; else only alarms that are not normal.
-    span : str
-        Name of the time span before now (`RANGES`), or ``all``.
-    search : str
-        Words; each must occur in tag, name, sentence, person or text.
-    area : str
-        Area of the valves, including its sub-areas.
-    states : frozenset of AlarmState
-        States to list; empty for all.
-    kinds : frozenset of AlarmKind
-        Kinds of alarm to list; empty for all.
-    """
+    """Filters of an alarm page."""
 
     is_journal: bool = False
+    """Whether to list all events; else only alarms that are not normal."""
     span: str = _ALL
+    """Name of the time span before now (`RANGES`), or ``all``."""
     search: str = ""
+    """Words; each must occur in tag, name, sentence, person or text."""
     area: str = "/"
+    """Area of the valves, including its sub-areas."""
     states: frozenset[AlarmState] = frozenset()
+    """States to list; empty for all."""
     kinds: frozenset[AlarmKind] = frozenset()
+    """Kinds of alarm to list; empty for all."""
 
     @classmethod
     def from_query(cls, query: Mapping[str, str]) -> "AlarmSelection":

@@ -58,24 +58,14 @@ def element(tag: str, css: str = "", **attributes: str) -> ui.element:
 
 @dataclass(frozen=True)
 class Frame:
-    """The frame of a page, as its content uses it.
-
-    Attributes
-    ----------
-    zone : ZoneInfo
-        Time zone.
-    common : dict of str to str
-        Parts of the address common to all pages: zone and theme.
-    address : AddressBar
-        The address of the page.
-    clock : ui.label
-        Label with the time of day.
-    """
+    """The frame of a page, as its content uses it."""
 
     zone: ZoneInfo
     common: dict[str, str]
+    """Parts of the address common to all pages: zone and theme."""
     address: AddressBar
     clock: ui.label
+    """Label with the time of day."""
 
     def link(self, path: str, **parts: str) -> str:
         """Return the address of a page in the same zone and theme."""

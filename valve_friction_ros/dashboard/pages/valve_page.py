@@ -468,7 +468,6 @@ class _ValvePage:
             redraw(body, draw)
 
     async def _events(self) -> list[AlarmEvent]:
-        """Read the events of the valve's alarms."""
         chosen = AlarmFilter(valve=self._node)
         try:
             found = await run.io_bound(self._context.history.alarms, chosen, True, _MOST_EVENTS)

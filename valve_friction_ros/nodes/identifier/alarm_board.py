@@ -71,13 +71,6 @@ class AlarmBoard:
 
     The alarms are those of the history; without one, or while it cannot be written, those of this
     run.
-
-    Attributes
-    ----------
-    alarms : dict of AlarmKind to Alarm
-        The alarms by kind, without those never raised.
-    is_requested : bool
-        Whether somebody asked for the next identification: its 95 % interval then decides.
     """
 
     def __init__(
@@ -90,6 +83,7 @@ class AlarmBoard:
         self._node, self._monitor, self._history = node, monitor, history
         self._evidence = evidence
         self.alarms: dict[AlarmKind, Alarm] = history.look_up(database.read_alarms) or {}
+        """The alarms by kind, without those never raised."""
         moves = evidence.evidence
         self._hold = FrictionHold(
             {side: self._condition(kind) for side, kind in ALARM_OF_SIDE.items()},
@@ -102,6 +96,7 @@ class AlarmBoard:
         }
         self._identified: int | None = None
         self.is_requested = False
+        """Whether somebody asked for the next identification: its 95 % interval then decides."""
         self._under_way: _Step | None = None
         self._on_record = dict(self.alarms)
         if not node.tells_parameters:

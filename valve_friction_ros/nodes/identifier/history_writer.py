@@ -161,16 +161,6 @@ class HistoryWriter:
     """Writes to the history in another thread, so that a slow disk does not delay the node.
 
     Changes that could not be written wait, and are retried with the next change.
-
-    Attributes
-    ----------
-    valve : KeptValve
-        The valve, with its name in the history.
-    baseline : KeptBaseline or None
-        The last stored baseline, with its record; another one may be in force. None if it was
-        withdrawn.
-    trend : Trend or None
-        Drift of the Coulomb friction at the latest identification.
     """
 
     def __init__(
@@ -187,7 +177,10 @@ class HistoryWriter:
         self._waiting = WaitingChanges()
         self._problem: str | None = None
         self.trend: Trend | None = None
+        """Drift of the Coulomb friction at the latest identification."""
         self.baseline: KeptBaseline | None = None
+        """The last stored baseline, with its record; another one may be in force. None if it was
+        withdrawn."""
         self._former: KeptBaseline | None = None
         self._under_way: list[Future[None]] = []
         self._look: Future[None] | None = None

@@ -109,23 +109,10 @@ class PolledNode(Node):
         Arguments of `rclpy.node.Node`.
     start_type_description_service : bool
         Whether the node has the service ``~/get_type_description``, if its parameter allows.
-
-    Attributes
-    ----------
-    last_heard : float
-        Time of the last message taken from its streams, s of the monotonic clock; initially the
-        start.
-    awaited : dict of str to str
-        Topics to which it subscribes once they have a publisher, with their types.
-    offered : dict of str to str
-        Topics that it publishes once they have a subscriber, with their types.
-    tells_parameters : bool
-        Whether it has services for its parameters.
-    is_active : bool
-        Whether it works; only a `ManagedNode` may be inactive.
     """
 
     is_active = True
+    """Whether it works; only a `ManagedNode` may be inactive."""
 
     def __init__(
         self,
@@ -135,10 +122,15 @@ class PolledNode(Node):
         **named: Any,
     ) -> None:
         self.last_heard = time.monotonic()
+        """Time of the last message taken from its streams, s of the monotonic clock; initially the
+        start."""
         self.awaited: dict[str, str] = {}
+        """Topics to which it subscribes once they have a publisher, with their types."""
         self.offered: dict[str, str] = {}
+        """Topics that it publishes once they have a subscriber, with their types."""
         self._failures: dict[str, str] = {}
         self.tells_parameters = start_parameter_services
+        """Whether it has services for its parameters."""
         self._services_in_turns = _TakenInTurns()
         self._callbacks_lock = threading.RLock()
         self._poll_timer: Timer | None = None

@@ -215,17 +215,11 @@ class Companion:
     ----------
     name : str
         Name of the thread.
-
-    Attributes
-    ----------
-    has_ended : threading.Event
-        Whether the context has ended.
-    thread : threading.Thread
-        The thread.
     """
 
     def __init__(self, name: str) -> None:
         self.has_ended = threading.Event()
+        """Whether the context has ended."""
         self.thread = threading.Thread(target=self.run, name=name, daemon=True)
 
     def __enter__(self: _Companion) -> _Companion:

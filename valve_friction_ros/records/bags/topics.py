@@ -38,23 +38,16 @@ class Topic(NamedTuple):
 
 @dataclass(frozen=True)
 class TopicChoice:
-    """Topics, joint and valve to read from an ambiguous bag.
-
-    Attributes
-    ----------
-    pressure, stem : str or None
-        Topics of pressure and stem; without a leading slash the name is relative to the namespace
-        of each valve. None: found by type.
-    joint : str or None
-        Name of the joint of the stem; None: the only joint, or the joint called `stem`.
-    valve : str or None
-        Namespace of the single valve to read; None: all.
-    """
+    """Topics, joint and valve to read from an ambiguous bag."""
 
     pressure: str | None = None
     stem: str | None = None
+    """Topics of pressure and stem; without a leading slash the name is relative to the namespace of
+    each valve. None: found by type."""
     joint: str | None = None
+    """Name of the joint of the stem; None: the only joint, or the joint called `stem`."""
     valve: str | None = None
+    """Namespace of the single valve to read; None: all."""
 
 
 class StreamNames(NamedTuple):
