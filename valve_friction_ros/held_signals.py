@@ -9,6 +9,8 @@
 
 """What a source does to its signal: it repeats, omits or interpolates values; no ROS."""
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -102,35 +104,63 @@ SLOW_SAMPLING = 0.15
 
 _ROUNDING = 1e-7
 _ON_LINE, _OFF_LINE = 0.51, 5.0
-_FEWEST_LINES, _LEAST_INSIDE = 50, 0.15
-_USUAL_CHANGE, _LARGEST_CHANGE = 0.02, 0.1
+_LARGEST_CHANGE = 0.1
 _UNEQUAL = 2.0
 """Conditions of a signal that is interpolated between stored values.
 
 Values are rounded to the least difference between two of them, of at least `_ROUNDING` of their
 range. A sample lies on the line between its neighbours if it is within `_ON_LINE` of that step. The
 others are typically `_OFF_LINE` steps and more off the line, which noise of a coarse converter is
-not. There are at least `_FEWEST_LINES` lines, with the share `_LEAST_INSIDE` of all samples that
-change. Over most of them the signal changes by no more than a usual dead band, `_USUAL_CHANGE` of
-the range; a change beyond `_LARGEST_CHANGE` is a move. And the longest of them are `_UNEQUAL` times
-as long as the shortest: a regular scan has no dead band. Chosen: 52 of 80 interpolated records with
-dead bands of 0.1 to 1 % fulfil this in one signal or both, and 3 of 196 others."""
+not. A change beyond `_LARGEST_CHANGE` of the range is a move. The longest lines are `_UNEQUAL`
+times as long as the shortest: a regular scan has no dead band."""
 
 
-def as_archived(signal: StampedSignal) -> StampedSignal:
-    """Hold each stored value of a signal that a historian has interpolated, up to the next one.
+class _Evidence(NamedTuple):
+    """What a signal needs to be taken as interpolated.
 
-    A historian with a dead band stores a value only when it has left the band, and draws lines
-    between the stored values. Such a line has no noise, and it moves a stem that rests. Other
-    signals are returned unchanged, and so is one that is sampled faster than historians do.
+    The least number of lines, their least share of the samples that change, and the largest change
+    over most of them, as a share of the range.
     """
+
+    lines: int
+    inside: float
+    change: float
+
+
+_ALONE = _Evidence(50, 0.15, 0.02)
+_BESIDE = _Evidence(10, 0.05, 0.05)
+"""Evidence without and with another signal of the record that is interpolated.
+
+Chosen: 52 of 80 interpolated records with dead bands of 0.1 to 1 % fulfil the former in one signal
+or both, and 3 of 196 others."""
+
+
+class _Lines(NamedTuple):
+    """A signal as lines between its stored values.
+
+    The step of its rounding; for each line its first sample, its length in samples and its change;
+    whether the signal changes on it, or rests; and how far the stored values are off the lines
+    between their neighbours.
+    """
+
+    step: float
+    first: NDArray[np.intp]
+    length: NDArray[np.intp]
+    change: NDArray[np.float64]
+    is_line: NDArray[np.bool_]
+    is_still: NDArray[np.bool_]
+    off: NDArray[np.float64]
+
+
+def _lines_of(signal: StampedSignal) -> _Lines | None:
+    """Divide a signal into lines; None if it is sampled faster than historians do, or too short."""
     time, value = signal.time, signal.value
-    if signal.period <= SLOW_SAMPLING or value.size < 3 * _FEWEST_LINES:
-        return signal
+    if signal.period <= SLOW_SAMPLING or value.size < 3 * _ALONE.lines:
+        return None
     steps = np.diff(np.unique(value))
     steps = steps[steps > _ROUNDING * np.sum(steps)]
     if not steps.size:
-        return signal
+        return None
     step = float(steps.min())
     share = (time[2:] - time[1:-1]) / (time[2:] - time[:-2])
     off = np.abs(value[1:-1] - share * value[:-2] - (1.0 - share) * value[2:])
@@ -141,23 +171,50 @@ def as_archived(signal: StampedSignal) -> StampedSignal:
     slope = change / (time[last] - time[first])
     line = value[first][run] + slope[run] * (time[:-1] - time[first][run])
     apart = np.maximum.reduceat(np.abs(value[:-1] - line), first)
-    is_line = (last - first > 1) & (apart <= 2.0 * _ON_LINE * step) & (np.abs(change) > step)
-    is_still = (last - first > 1) & (np.abs(change) <= step)
-    inside, still = (float(np.sum((last - first)[which])) for which in (is_line, is_still))
-    if (
-        np.count_nonzero(is_line) < _FEWEST_LINES
-        or inside < _LEAST_INSIDE * (value.size - still)
-        or float(np.median(off[stored[1:-1]])) < _OFF_LINE * step
-        or float(np.median(np.abs(change[is_line]))) > _USUAL_CHANGE * np.ptp(value)
-    ):
+    is_long, moves = last - first > 1, np.abs(change) > step
+    is_line = is_long & (apart <= 2.0 * _ON_LINE * step) & moves
+    return _Lines(step, first, last - first, change, is_line, is_long & ~moves, off[stored[1:-1]])
+
+
+def _is_archived(signal: StampedSignal, lines: _Lines | None, evidence: _Evidence) -> bool:
+    """Return whether a signal shows that much evidence of a historian."""
+    if lines is None or np.count_nonzero(lines.is_line) < evidence.lines:
+        return False
+    length, change = lines.length[lines.is_line], np.abs(lines.change[lines.is_line])
+    changing = signal.value.size - float(np.sum(lines.length[lines.is_still]))
+    shortest, longest = np.quantile(length, (0.1, 0.9))
+    return bool(
+        np.sum(length) >= evidence.inside * changing
+        and np.median(lines.off) >= _OFF_LINE * lines.step
+        and np.median(change) <= evidence.change * np.ptp(signal.value)
+        and longest > _UNEQUAL * shortest
+    )
+
+
+def as_archived(*signals: StampedSignal) -> tuple[StampedSignal, ...]:
+    """Hold each stored value of signals that a historian has interpolated, up to the next one.
+
+    A historian with a dead band stores a value only when it has left the band, and draws lines
+    between the stored values. Such a line has no noise, and it moves a stem that rests. Other
+    signals are returned unchanged, and so is one that is sampled faster than historians do. Where
+    one signal of a record is interpolated, less evidence is needed for the others.
+    """
+    lines = [_lines_of(signal) for signal in signals]
+    pairs = list(zip(signals, lines, strict=True))
+    if not any(_is_archived(signal, of, _ALONE) for signal, of in pairs):
+        return signals
+    return tuple(_held(signal, of) for signal, of in pairs)
+
+
+def _held(signal: StampedSignal, lines: _Lines | None) -> StampedSignal:
+    """Hold the stored values of a signal, beside or itself one that is interpolated."""
+    if lines is None or not _is_archived(signal, lines, _BESIDE):
         return signal
-    shortest, longest = np.quantile((last - first)[is_line], (0.1, 0.9))
-    if longest <= _UNEQUAL * shortest:
-        return signal
-    held = (is_line & (np.abs(change) <= _LARGEST_CHANGE * np.ptp(value)))[run]
-    found = value.copy()
-    found[:-1][held] = value[first][run][held]
-    return StampedSignal(time, found)
+    is_small = np.abs(lines.change) <= _LARGEST_CHANGE * np.ptp(signal.value)
+    held = np.repeat(lines.is_line & is_small, lines.length)
+    found = signal.value.copy()
+    found[:-1][held] = np.repeat(signal.value[lines.first], lines.length)[held]
+    return StampedSignal(signal.time, found)
 
 
 _LEAST_HOLD, _LEAST_HELD = 3, 0.3

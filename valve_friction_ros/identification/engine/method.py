@@ -504,18 +504,12 @@ def stamped_record(recording: Recording) -> StampedRecord:
     What a historian has interpolated is held.
     """
     if (stamped := recording.stamped) is not None:
-        return replace(
-            stamped,
-            drive=as_sent_on_change(as_archived(stamped.drive)),
-            position=as_sent_on_change(as_archived(stamped.position)),
-        )
+        drive, position = map(as_sent_on_change, as_archived(stamped.drive, stamped.position))
+        return replace(stamped, drive=drive, position=position)
     excitation.require_unbroken(recording)
     time = recording.time
-    return StampedRecord(
-        as_archived(StampedSignal(time, recording.drive)),
-        as_archived(StampedSignal(time, recording.position)),
-        recording.driven_by,
-    )
+    drive, position = (StampedSignal(time, one) for one in (recording.drive, recording.position))
+    return StampedRecord(*as_archived(drive, position), recording.driven_by)
 
 
 def prior_of(
