@@ -296,16 +296,6 @@ def test_the_same_question_has_the_same_answer(plan):
     assert shares[-1] == pytest.approx(1.0)
 
 
-def test_the_aim_decides():
-    told = {}
-    for aim in ("coulomb_friction", "viscous_friction"):
-        best = plan_test(BENCH_VALVE, KNOWN_EXACTLY, QUICK, CONDITIONS, SETTINGS, aim)
-        assert best.aim == aim
-        told[aim] = expected_of(best.test, KNOWN_EXACTLY.draws[0])
-    for aim, one in told.items():  # the search is local
-        assert one.relative(aim) <= 1.5 * min(other.relative(aim) for other in told.values())
-
-
 def test_unknown_friction_has_a_useful_test_for_every_packing():
     unknown = unknown_friction(BENCH_VALVE, SEARCH_SPRING, 1.6)
     found = plan_test(BENCH_VALVE, unknown, Limits(duration=30.0), CONDITIONS, SETTINGS)
@@ -518,14 +508,6 @@ def test_a_player_that_stood_still_goes_back_in_place_of_a_jump():
     hear(test, 102.5)
     assert test.step(102.5) == test.home
     assert test.aborted.code is Code.PLAYER_STALLED
-
-
-def test_who_asks_gets_it_back_at_once():
-    test = started(102.0)
-    test.abort(said(Code.PLAYER_SHUT_DOWN))
-    hear(test, 102.0)
-    assert test.step(102.0) == test.home
-    assert test.aborted.code is Code.PLAYER_SHUT_DOWN
 
 
 def test_it_can_be_started_again_after_each_end_and_not_while_it_plays():
