@@ -21,7 +21,6 @@ import numpy as np
 import pytest
 from answers import KEYS, PARAMETER_KEYS, row_of
 from bags import PRESSURE, messages_of, storage_file, write_bag
-from kept_rows import csv_rows
 from pages import PageReader
 from processes import ran
 from records import simulated
@@ -235,17 +234,6 @@ def test_it_is_said_at_the_end_of_the_table(call, graphite_file):
     assert code == 0
     assert "no baseline yet" in out.splitlines()[-1]
     assert out.rstrip().endswith("good by the limits for a first survey")
-
-
-@pytest.mark.parametrize(("given", "survey"), CASES[:2])
-def test_of_a_folder(command, graphite_file, given, survey, tmp_path):
-    folder = tmp_path / "recordings"
-    folder.mkdir()
-    (folder / RECORDING.name).write_bytes(RECORDING.read_bytes())
-    table = tmp_path / "results.csv"
-    words = folder, "--valve", graphite_file, "--method", "bench", "--output", table
-    assert command("identify-folder", *words, *given)[0] == 0
-    assert [row["survey"] for row in csv_rows(table)] == [survey]
 
 
 def test_limits_out_of_order_are_refused(refusal, graphite_file):
