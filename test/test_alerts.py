@@ -34,7 +34,6 @@ from webhook_server import (
 
 from valve_friction_ros.alerts import (
     SIGNATURE,
-    WAITS,
     Alert,
     AlertSender,
     DeliveryError,
@@ -198,12 +197,6 @@ def failure(url, limit=LIMIT):
     assert "hook" not in str(failed.value)
     assert "t0ken" not in str(failed.value)
     return failed.value
-
-
-def test_the_waits_grow_and_end():
-    assert WAITS[:4] == (1.0, 2.0, 4.0, 8.0)
-    assert max(WAITS) == 300.0
-    assert 3000 < sum(WAITS) < 4000
 
 
 def test_an_alert_arrives_once_and_signed(sender):

@@ -241,31 +241,23 @@ def test_memory_is_bounded(same):
         assert stream.size <= 50_400
 
 
+def swept(time, position):
+    """Arrivals of a stem at these positions, in balance with the pressure."""
+    way = np.sign(np.gradient(position))
+    pressure = (SPRING * position + PRELOAD + way * FRICTION) / VALVE.diaphragm_area
+    stamps = START + np.round(time * 1e9).astype(np.int64)
+    return arrivals(stamps, pressure + VALVE.pressure_reference, position)
+
+
 def test_a_turn_without_a_rest_makes_two_moves():
     """A quick stroke up and down, at 50 Hz."""
     time = np.arange(0, 60, 0.02)
     phase = np.clip(time - 30, 0, 4)
     position = 0.01 + 2e-3 * np.sin(np.pi * phase / 4)
-    way = np.sign(np.gradient(position))
-    pressure = (SPRING * position + PRELOAD + way * FRICTION) / VALVE.diaphragm_area
-    stamps = START + np.round(time * 1e9).astype(np.int64)
-    found = taken_by(100, arrivals(stamps, pressure + VALVE.pressure_reference, position))
+    found = taken_by(100, swept(time, position))
     assert [one.direction for one in found] == [1, -1]
     for move in found:
         assert friction_of(move) == pytest.approx(FRICTION, rel=0.01)
-
-
-def test_no_part_of_a_long_motion_is_taken_for_one_of_another_time():
-    """A slow swing of the stem without a rest, cut after ten seconds."""
-    time = np.arange(0, 180, 0.02)
-    position = 0.014 + 0.01 * np.sin(2 * np.pi * time / 60)
-    way = np.sign(np.gradient(position))
-    pressure = (SPRING * position + PRELOAD + way * FRICTION) / VALVE.diaphragm_area
-    stamps = START + np.round(time * 1e9).astype(np.int64)
-    found = taken_by(100, arrivals(stamps, pressure + VALVE.pressure_reference, position))
-    assert len(found) >= 15
-    for before, after in pairwise(found):
-        assert stamp_problem(after, before.end, int(stamps[-1])) == ""
 
 
 @pytest.mark.parametrize("period", [0.004, 0.1])
@@ -273,10 +265,7 @@ def test_the_parts_of_a_slow_stroke_follow_each_other(period):
     """A minute up and a minute down are cut, and no part overlaps the one before it."""
     time = np.arange(0, 120, period)
     position = 2e-3 + 0.02 * np.abs((time / 60) % 2 - 1)
-    way = np.sign(np.gradient(position))
-    pressure = (SPRING * position + PRELOAD + way * FRICTION) / VALVE.diaphragm_area
-    stamps = START + np.round(time * 1e9).astype(np.int64)
-    found = taken_by(50, arrivals(stamps, pressure + VALVE.pressure_reference, position))
+    found = taken_by(50, swept(time, position))
     assert found[-1].end > START + 105e9
     pauses = [then.begin - one.end for one, then in pairwise(found)]
     assert min(pauses) >= 0, pauses

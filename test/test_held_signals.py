@@ -58,22 +58,16 @@ def test_jittering_holds_are_found():
     assert found.period == pytest.approx(0.02)
 
 
-@pytest.mark.parametrize("step", [0.0, 0.02])
-def test_noise_is_not_held(step):
-    time, values = noisy(20_000, np.random.default_rng(3))
-    signal = StampedSignal(time, step * np.rint(values / step) if step else values)
-    assert without_repeats(signal) is signal
+NOISY = noisy(20_000, np.random.default_rng(3))[1]
 
 
-def test_a_converter_behind_a_slow_stem_is_not_held():
-    """Its values stay, and change by one step each."""
-    time = np.arange(20_000) * PERIOD
-    signal = StampedSignal(time, 0.01 * np.rint(time / 0.1))
-    assert without_repeats(signal) is signal
-
-
-def test_a_constant_signal_is_returned():
-    signal = StampedSignal(np.arange(100.0), np.ones(100))
+@pytest.mark.parametrize(
+    "values",
+    [NOISY, 0.02 * np.rint(NOISY / 0.02), 0.01 * np.rint(np.arange(20_000) / 100), np.ones(100)],
+    ids=["noise", "coarse noise", "a converter behind a slow stem, by one step each", "constant"],
+)
+def test_what_is_not_held_stays_as_it_is(values):
+    signal = StampedSignal(PERIOD * np.arange(values.size), values)
     assert without_repeats(signal) is signal
 
 
@@ -183,13 +177,6 @@ class TestArchived:
         fast = StampedSignal(0.1 * signal.time, signal.value)
         assert as_archived(fast) is fast
 
-    def test_a_curve_is_no_line(self):
-        """With spikes, between which it is straight from sample to sample."""
-        values = 50.0 * np.sin(2.0 * np.pi * self.TIME / 400.0)
-        values[::37] += 3.0
-        signal = StampedSignal(self.TIME, np.round(values, 1))
-        assert as_archived(signal) is signal
-
     @pytest.mark.parametrize("step", [0.0, 0.01, 0.1, 1.0])
     @pytest.mark.parametrize("noise", [0.0, 0.03, 0.3])
     @pytest.mark.parametrize("period", [50.0, 400.0, 3000.0])
@@ -201,14 +188,16 @@ class TestArchived:
         signal = StampedSignal(self.TIME, step * np.rint(values / step) if step else values)
         assert as_archived(signal) is signal
 
-    def test_steps_of_an_operator_are_as_they_were(self):
-        """No noise: the valve rests at each level."""
-        values = np.repeat(np.random.default_rng(8).uniform(0.0, 100.0, 40), 100)
-        signal = StampedSignal(self.TIME, values)
-        assert as_archived(signal) is signal
+    CURVE = 50.0 * np.sin(2.0 * np.pi * TIME / 400.0) + 3.0 * (TIME % 37 == 0)
+    LEVELS = np.repeat(np.random.default_rng(8).uniform(0.0, 100.0, 40), 100)
 
-    def test_a_constant_signal_is_returned(self):
-        signal = StampedSignal(self.TIME, np.ones(4000))
+    @pytest.mark.parametrize(
+        "values",
+        [np.round(CURVE, 1), LEVELS, np.ones(4000)],
+        ids=["a curve, straight between its spikes", "levels of an operator", "constant"],
+    )
+    def test_what_no_historian_has_stored_is_as_it_was(self, values):
+        signal = StampedSignal(self.TIME, values)
         assert as_archived(signal) is signal
 
 

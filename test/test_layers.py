@@ -12,6 +12,7 @@
 import ast
 import importlib
 import inspect
+from functools import cache
 from graphlib import TopologicalSorter
 from pathlib import Path
 
@@ -97,8 +98,13 @@ def sources_of(room):
     return sorted((SOURCES / room).rglob("*.py")) or [SOURCES / f"{room}.py"]
 
 
+@cache
 def imported(path):
     """Absolute names of all modules that a source file imports, wherever in it."""
+    return tuple(_imported(path))
+
+
+def _imported(path):
     for statement in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(statement, ast.Import):
             yield from (alias.name for alias in statement.names)

@@ -336,16 +336,6 @@ def test_stiff_bristles_are_the_set_valued_law(law):
     assert stiff.work == pytest.approx(rigid.work, rel=1e-3)
 
 
-@pytest.mark.parametrize("law", [Law.KARNOPP, Law.LATCHED])
-def test_karnopp_without_a_dead_zone_is_the_set_valued_law(law):
-    friction = replace(FRICTION, stribeck_velocity=0.0)
-    signal = ramps(0.3, 0.8, 0.8, 0.3, 0.6)
-    difference = (
-        moved(friction, signal).position - moved(replace(friction, law=law), signal).position
-    )
-    assert np.abs(difference).max() < 1e-6
-
-
 @pytest.mark.parametrize("law", [Law.MOREAU, Law.KARNOPP, Law.LATCHED])
 def test_sticks_below_static_friction(law):
     friction = replace(FRICTION, law=law)
@@ -449,12 +439,6 @@ def stem(one, sensor=QUIET, stamping=None, seed=0):
 
 def seconds(signal):
     return signal.stamps / 1e9
-
-
-def test_perfect_sensor():
-    signal = stem(RAMP)
-    assert (np.diff(signal.stamps) == 1_000_000).all()
-    assert signal.values == pytest.approx(1e-3 * seconds(signal), abs=1e-12)
 
 
 def test_white_and_coloured_noise():

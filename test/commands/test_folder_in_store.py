@@ -140,7 +140,8 @@ def test_one_line_names_the_extra(arguments, refused, monkeypatch):
 
 
 def test_a_server_that_is_away(arguments, refused, monkeypatch):
-    settings = {"s3": {"key": "k", "secret": "s", "endpoint_url": "http://127.0.0.1:9"}}
+    settings = {"s3": {"key": "k", "secret": "s", "endpoint_url": "http://127.0.0.1:9",
+                       "config_kwargs": {"retries": {"max_attempts": 1}}}}  # fmt: skip
     monkeypatch.setattr(fsspec.config, "conf", settings)
     told = refused("identify-folder", "s3://elsewhere/north", *arguments[2:])
     assert "s3://elsewhere/north: " in told

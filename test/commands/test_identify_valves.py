@@ -19,9 +19,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from answers import KEYS, PARAMETER_KEYS, none_for_nan, row_of, values
+from answers import KEYS, PARAMETER_KEYS, row_of
 from bags import PRESSURE, messages_of, storage_file, write_bag
-from kept_rows import csv_rows
 from pages import PageReader
 from processes import ran
 from records import simulated
@@ -31,18 +30,15 @@ from valve_friction_ros.identification import (
     UNITS,
     IdentificationSettings,
     identify_plant,
-    identify_signature,
 )
 from valve_friction_ros.model import (
     BENCH_VALVE,
     GRAPHITE_PACKING,
     GRAPHITE_VALVE,
-    HIGH_FRICTION,
     LOW_FRICTION,
     Recording,
     SensorNoise,
     SineWave,
-    TriangleWave,
     simulate,
 )
 
@@ -101,24 +97,6 @@ def test_calibration_reaches_settings_intervals_and_budget(printed, path):
     assert spring["half_width"] == pytest.approx(math.hypot(known["half_width"], 2 * error))
     budget = found["evidence"]["uncertainty_budget"]["spring_constant"]
     assert budget["calibration"] == pytest.approx(error)
-
-
-def test_a_signature(printed, write_csv, columns_of):
-    """By ``--method signature``, as the library identifies it."""
-    pressure = TriangleWave().sample(np.arange(13_000) / 100)
-    record = simulated(pressure, 0.01, HIGH_FRICTION)
-    expected = identify_signature(record, BENCH_VALVE, SETTINGS)
-    answer = printed(write_csv(columns_of(record)), "--method", "signature")
-    assert answer["method"] == "signature"
-    assert values(answer) == pytest.approx(
-        {name: none_for_nan(value) for name, value in expected.values.items()}, rel=1e-9
-    )
-    signature, evidence = expected.signature, answer["evidence"]
-    assert evidence["position_bias"] == pytest.approx(signature.position_bias, rel=1e-6)
-    assert evidence["dead_zone"] == pytest.approx(signature.dead_zone, rel=1e-9)
-    assert [one["direction"] for one in evidence["breakaway_points"]] == [1, -1, 1, -1, 1]
-    assert {entry["published"] for entry in answer["parameters"].values()} == {None}
-    assert answer["fit"] == pytest.approx(expected.fit, rel=1e-6)
 
 
 FALLING = replace(GRAPHITE_PACKING, mass=1.6, stribeck_velocity=3.26e-3)
@@ -256,17 +234,6 @@ def test_it_is_said_at_the_end_of_the_table(call, graphite_file):
     assert code == 0
     assert "no baseline yet" in out.splitlines()[-1]
     assert out.rstrip().endswith("good by the limits for a first survey")
-
-
-@pytest.mark.parametrize(("given", "survey"), CASES[:2])
-def test_of_a_folder(command, graphite_file, given, survey, tmp_path):
-    folder = tmp_path / "recordings"
-    folder.mkdir()
-    (folder / RECORDING.name).write_bytes(RECORDING.read_bytes())
-    table = tmp_path / "results.csv"
-    words = folder, "--valve", graphite_file, "--method", "bench", "--output", table
-    assert command("identify-folder", *words, *given)[0] == 0
-    assert [row["survey"] for row in csv_rows(table)] == [survey]
 
 
 def test_limits_out_of_order_are_refused(refusal, graphite_file):

@@ -82,18 +82,6 @@ def full(tmp_path):
     return filled(tmp_path)
 
 
-def test_what_was_there_and_what_comes_arrives(history, database):
-    fill(history)
-    with sending(history, database) as sender:
-        wait_until_sent(sender)
-        assert all_of(History(database)) == all_of(history)
-        fill(history, OTHER)
-        history.add(success(START + 9))
-        wait_until_sent(sender)
-        assert all_of(History(database)) == all_of(history)
-        assert sender.state.is_sending
-
-
 def test_what_changes_and_what_goes_follows(history, database):
     fill(history)
     with sending(history, database) as sender:

@@ -340,18 +340,12 @@ def test_a_refusal(monitor):
     assert entry.span == (0, 499 * PERIOD)
 
 
-def test_a_refusal_of_nothing(monitor):
-    monitor.buffer.clear("on request")
-    empty, refusal = monitor.buffer.snapshot(), RefusalError("no samples")
-    assert entry_of(monitor, VALVE, empty, monitor.settings, START, refusal).span is None
-
-
 @pytest.mark.parametrize(("name", "method"), [("best", "plant"), ("bench", "bench")])
 def test_a_refusal_has_the_method_that_would_have_identified(name, method):
     monitor = FrictionMonitor(MonitorSettings(BENCH_VALVE, method=name))
     empty, refusal = monitor.buffer.snapshot(), RefusalError("no samples")
     entry = entry_of(monitor, VALVE, empty, monitor.settings, START, refusal)
-    assert entry.method == method
+    assert (entry.method, entry.span) == (method, None)
 
 
 def test_neither_a_success_nor_a_refusal_or_both():

@@ -201,9 +201,6 @@ def test_kink_at_every_sample(name):
     assert np.abs(found.velocity - velocity).max() < AGREED_VELOCITY
 
 
-PRESSURE = converter_response(SquareWave().sample(np.arange(0, 21, SAMPLE_PERIOD)), SAMPLE_PERIOD)
-
-
 def test_friction_force_of_the_sliding_stem():
     """The law, written out: v = v_s leaves 1/e of F_s − F_c."""
     parameters = KarnoppParameters(
@@ -220,27 +217,6 @@ def test_friction_force_of_the_sliding_stem():
     assert up == pytest.approx(1.1 * (2 + 3 / np.e) + 0.8 * 5, rel=1e-14)
     assert down == pytest.approx(-0.9 * (2 + 3 / np.e) - 1.2 * 5, rel=1e-14)
     assert rest == 0
-
-
-def test_slow_fall_is_plain_friction_at_the_static_level():
-    """A Stribeck velocity far above all speeds: friction stays at F_s."""
-    endless = replace(GRAPHITE_PACKING, stribeck_velocity=1e3)
-    level = replace(GRAPHITE_PACKING, coulomb_friction=GRAPHITE_PACKING.static_friction)
-    falling, plain = (
-        simulate(GRAPHITE_VALVE, one, PRESSURE, SAMPLE_PERIOD).position for one in (endless, level)
-    )
-    assert np.abs(falling - plain).max() < 1e-9
-
-
-def test_mirrored_asymmetry_mirrors_the_motion():
-    """Up and down exchanged with the sign of the force: the stem moves as in a mirror."""
-    valve = replace(GRAPHITE_VALVE, travel=np.inf)
-    skewed = replace(FALLING, spring_preload=0.0, coulomb_asymmetry=0.2, viscous_asymmetry=0.1)
-    mirrored = replace(skewed, coulomb_asymmetry=-0.2, viscous_asymmetry=-0.1)
-    pressure = PRESSURE - PRESSURE.mean()
-    up = simulate(valve, skewed, pressure, SAMPLE_PERIOD).position
-    down = simulate(valve, mirrored, -pressure, SAMPLE_PERIOD).position
-    assert np.abs(up + down).max() < 1e-15
 
 
 @pytest.mark.parametrize("name", ["coulomb_asymmetry", "viscous_asymmetry"])

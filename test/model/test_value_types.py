@@ -18,7 +18,6 @@ from scipy.signal import dlsim
 
 from valve_friction_ros.model import (
     BENCH_VALVE,
-    DEFAULT_LAG,
     GRAPHITE_PACKING,
     HIGH_FRICTION,
     LOW_FRICTION,
@@ -312,15 +311,6 @@ class TestEveryExcitation:
 
 
 class TestConverter:
-    def test_step_gives_an_exponential(self):
-        period, lag, step = 1e-3, DEFAULT_LAG, 500
-        command = np.where(np.arange(6000) < step, 6e4, 1.6e5)
-        since = period * np.maximum(np.arange(6000) - step, 0)
-        expected = 1.6e5 - 1e5 * np.exp(-since / lag)
-        found = converter_response(command, period, lag)
-        # One rounding a sample, which the filter forgets with its lag of 1300 samples.
-        np.testing.assert_allclose(found, expected, rtol=1300 * EPS)
-
     def test_any_command_as_scipy_steps_it(self):
         period, lag = 0.02, 0.3
         command = np.random.default_rng(0).uniform(4e4, 2e5, 400)

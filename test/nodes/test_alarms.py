@@ -16,7 +16,7 @@ import sqlite3
 import time
 
 import pytest
-from histories import DAY, OTHER, START, VALVE, success
+from histories import OTHER, START, VALVE, success
 from live_nodes import ERROR, NODE, OK, WARN, values_of
 from records import quick_record
 from std_msgs.msg import Float64
@@ -25,11 +25,9 @@ from webhook_server import Receiver
 
 from valve_friction_ros.health import AlarmAction, AlarmKind, AlarmRequest, Baseline, Level
 from valve_friction_ros.history import (
-    AlarmRecording,
     HistoryFile,
     KeptBaseline,
     alarm_events,
-    keep_alarm_recording,
     read_alarms,
     request_many,
 )
@@ -97,29 +95,6 @@ def test_an_alarm_outlives_a_kill(live):
     assert status.level == OK
     assert "before the restart" not in status.message
     assert values_of(status)["estimate_from"] == "this run"
-
-
-def test_stamps_of_a_time_to_come(live, history, tmp_path):
-    """The clock went back while the node was down: the newest counts, and its age is no number."""
-    now = live.client.node.get_clock().now().nanoseconds
-    history.add(success(now - 9 * DAY, 90.0, baseline=None))
-    history.add(success(now + DAY, 400.0, baseline=None))
-    history.set_baseline(VALVE, KeptBaseline(Baseline(100.0, 1.0), START, START))
-    for place, stamp in enumerate((now + DAY, now - DAY)):
-        one = AlarmRecording(stamp, Level.WARN, tmp_path / f"{place}", "excess friction")
-        keep_alarm_recording(history, VALVE, one, days=365.0)
-    client = live.client_of_identifier()
-    status = client.next_status()
-    assert status.level == ERROR
-    assert status.message.endswith(
-        " (identified in the future: a clock has since been set back, before the restart)"
-    )
-    assert values_of(status)["alarm_recording"] == str(tmp_path / "1")
-    client.identified(HEALTHY)
-    live.kill(live.nodes[-1])
-    live.start_identifier()
-    status = client.next_status(lambda one: one.level != ERROR, "the newest result")
-    assert AGE.search(status.message)
 
 
 @pytest.mark.parametrize("gone", ["removed", "replaced"])

@@ -93,9 +93,6 @@ class TestGoodFiles:
         path.write_bytes(gzip.compress(path.read_bytes()))
         assert_good(read_csv(path))
 
-    def test_line_ends_and_mark_of_a_spreadsheet(self, write):
-        assert_good(read_csv(write(["\ufeff" + HEADER, *GOOD], newline="\r\n")))
-
     @pytest.mark.parametrize("factor", [1, 1_000_000])
     def test_days_of_a_clock_are_local_where_a_zone_is_given(self, write, factor):
         """Days since 1899-12-30, or WinCC's millionths of them; summer in Berlin is UTC + 2 h."""
@@ -260,14 +257,6 @@ class TestStretch:
         for stretch, size in ((Stretch(begin=0.0105), 29), (Stretch(begin=0.0005, end=0.0095), 9)):
             assert len(read_csv(path, stretch=stretch)) == size
 
-    def test_rows_are_counted_from_the_top(self, write):
-        message = refused(write(with_row(22, "0.02,0,3e5")), stretch=Stretch(begin=0.01))
-        assert message.startswith("row 22, column 'pressure_pa': 300000 Pa is outside")
-
-    def test_nothing_in_it(self, write):
-        message = refused(write([HEADER, *GOOD]), stretch=Stretch(begin=1.0))
-        assert message == "the chosen stretch holds no rows: choose another begin or end"
-
     @pytest.mark.parametrize("bad", [{"begin": 2, "end": 2}, {"begin": math.nan}, {"last": 0}])
     def test_impossible(self, bad):
         with pytest.raises(ValueError, match=r"cannot begin|must be above zero"):
@@ -343,9 +332,6 @@ class TestColumns:
         path = tmp_path / "record.csv.gz"
         path.write_bytes(gzip.compress("\n".join(lines).encode()))
         assert refused(path).startswith("row 3, column 'time_s' repeats (")
-
-    def test_the_newest_first(self, write):
-        assert_good(read_csv(write([HEADER, *GOOD[::-1]])))
 
 
 class TestEntries:
@@ -426,11 +412,6 @@ class TestEntries:
         assert "(--maximum-bad-share 0.11)" in refused(path)
         assert read_csv(path, form=Columns(maximum_bad_share=0.11))
 
-    def test_blank_rows_are_counted(self, write):
-        lines = with_row(12, "0.01,0.003,3e5")
-        lines[4:4] = ["", ""]
-        assert refused(write(lines)).startswith("row 14, column ")
-
     @pytest.mark.parametrize(
         ("pressure", "inside"),
         [(-3125.0, True), (257812.5, True), (-3125.1, False), (257812.6, False)],
@@ -448,19 +429,37 @@ class TestEntries:
             )
 
 
-class TestTimes:
-    def test_repeated(self, write):
-        assert refused(write(with_row(12, "0.009,0.003,1e5"))) == (
+HIGH = "column 'pressure_pa': 300000 Pa is outside the sensor's range 0 to 250000 Pa: "
+
+
+@pytest.mark.parametrize(
+    ("lines", "stretch", "message"),
+    [
+        (with_row(22, "0.02,0,3e5"), Stretch(begin=0.01), f"row 22, {HIGH}"),
+        (["", "", *with_row(12, "0.01,0,3e5")], None, f"row 14, {HIGH}"),
+        ([HEADER, *GOOD], Stretch(begin=1.0), "the chosen stretch holds no rows: choose another "),
+        (
+            with_row(12, "0.009,0.003,1e5"),
+            None,
             "row 12, column 'time_s' repeats (0.009 s after 0.009 s): export it with fractions of "
-            "a second, or delete one of the rows"
-        )
-
-    def test_backward(self, write):
-        assert refused(write(with_row(12, "0.0,0.003,1e5"))) == (
+            "a second, or delete one of the rows",
+        ),
+        (
+            with_row(12, "0.0,0.003,1e5"),
+            None,
             "row 12, column 'time_s' goes back (0 s after 0.009 s): "
-            "sort the rows, or use the record before or after it"
-        )
+            "sort the rows, or use the record before or after it",
+        ),
+        ([HEADER, GOOD[0]], None, "only one sample of pressure_pa: check that it is sampled cont"),
+        ([HEADER], None, "cannot tell what it holds: there are no values under the header"),
+    ],
+    ids=["from the top", "blank rows", "empty stretch", "repeated", "back", "one", "none"],
+)
+def test_what_is_wrong_with_the_rows_is_said_with_its_row(write, lines, stretch, message):
+    assert refused(write(lines), stretch=stretch).startswith(message)
 
+
+class TestTimes:
     def test_gap(self, write):
         """From row 12 on, the samples come 20 ms later: 21 periods without one."""
         late = TIME + 0.02 * (np.arange(40) >= 10)
@@ -495,11 +494,6 @@ class TestTimes:
         assert record.start_time == begin.timestamp()
         assert record.sample_period == 0.5
         np.testing.assert_array_equal(record.position, np.arange(40) / 1000)
-
-    def test_one_sample(self, write):
-        assert refused(write([HEADER, GOOD[0]])) == (
-            "only one sample of pressure_pa: check that it is sampled continuously"
-        )
 
 
 class TestUnreadableFiles:
@@ -537,10 +531,6 @@ class TestUnreadableFiles:
         assert "an archive, but not an Excel workbook" in refused(tmp_path / "a.zip")
         scipy.io.savemat(tmp_path / "a.mat", {"data": np.ones((9, 3)), "log": {"t": TIME}})
         assert refused(tmp_path / "a.mat").endswith("but data, log: save each signal as a vector")
-
-    def test_only_a_header(self, write):
-        told = refused(write([HEADER]))
-        assert told == "cannot tell what it holds: there are no values under the header"
 
     def test_no_header(self, write):
         """Columns are then called by their numbers."""
@@ -716,12 +706,6 @@ class TestWrittenDates:
             book.active.append([moment.date(), moment.time(), float(bar), float(share)])
         book.save(tmp_path / "record.xlsx")
         assert read_csv(tmp_path / "record.xlsx").start_time == noon.timestamp()
-
-    def test_a_column_of_milliseconds_beside_the_date(self, write):
-        stamps = [f"15.07.2026 12:00:{int(one):02d}" for one in AXIS]
-        rest = [f"{round(1e3 * one) % 1000}" for one in AXIS]
-        found = read_csv(write(lines("Time,ms,Air [bar],Stem [%]", stamps, rest, BARS, SHARES)))
-        assert found.time == pytest.approx(AXIS)
 
 
 class TestQualities:

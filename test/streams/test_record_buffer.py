@@ -68,12 +68,6 @@ class TestGoodSamples:
         assert record.start_time == START / 1e9
         assert len(buffer) == 1000
 
-    def test_the_last_window_of_them(self, buffer):
-        fill(buffer, 2500)
-        record = buffer.snapshot().recording()
-        assert record.duration == 1.0
-        assert record.pressure[0] == 1e5 + 1499
-
     def test_a_snapshot_stays_as_it_is(self, buffer):
         fill(buffer, 500)
         snapshot = buffer.snapshot()
@@ -156,14 +150,6 @@ class TestStampsThatGoBack:
         snapshot = buffer.snapshot()
         assert snapshot.rejections == ()
         assert str(snapshot.cleared_because) == cause
-
-    def test_the_next_good_window_is_a_recording(self, buffer):
-        fill(buffer, 500)
-        buffer.add_position(stamp(-5000), 0.0)
-        fill(buffer, 300, first=-4999)
-        record = buffer.snapshot().recording()
-        assert len(record) == 300
-        assert record.start_time == stamp(-4999) / 1e9
 
 
 class TestStampsThatWereOvertaken:

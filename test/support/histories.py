@@ -114,11 +114,21 @@ def change(history, script):
         connection.executescript(f"PRAGMA ignore_check_constraints = ON; {script}")
 
 
+_SINCE_VERSION_6 = (
+    "DROP INDEX identification_uid; ALTER TABLE identification DROP COLUMN uid; "
+    "DROP INDEX baseline_uid; ALTER TABLE baseline DROP COLUMN uid; "
+    "DROP TABLE keeper; DROP TABLE mark; PRAGMA user_version = 6"
+)
+"""Takes from a file of version 7 all by which its dump differs from that of version 6."""
+
+
 def make_version(version, history):
     """Fill a new file with what that version has dumped of its own."""
     history.path.parent.mkdir(parents=True, exist_ok=True)
-    dumped = Path(__file__).parents[1] / "history" / f"history_of_version_{version}.sql"
-    change(history, dumped.read_text())
+    name = f"history_of_version_{7 if version == 6 else version}.sql"
+    change(history, (Path(__file__).parents[1] / "history" / name).read_text())
+    if version == 6:
+        change(history, _SINCE_VERSION_6)
     return history
 
 
