@@ -105,6 +105,12 @@ class TestSentOnChange:
         assert as_sent_on_change(signal) is signal
 
 
+def archived(signal):
+    """The signal as it is held alone."""
+    (found,) = as_archived(signal)
+    return found
+
+
 class TestArchived:
     """A level with noise and some moves, stored when it has left a dead band of 0.5 % of 100."""
 
@@ -130,7 +136,7 @@ class TestArchived:
     @pytest.mark.parametrize("decimals", [3, 12])
     def test_each_stored_value_is_held_until_the_next(self, stored, decimals):
         rows, values = stored
-        found = as_archived(self.interpolated(stored, decimals))
+        found = archived(self.interpolated(stored, decimals))
         held = values[np.searchsorted(rows, self.TIME, side="right") - 1]
         np.testing.assert_array_equal(found.time, self.TIME)
         # Where three stored values are on a line by chance, the one between them is not found.
@@ -139,8 +145,8 @@ class TestArchived:
 
     def test_a_scale_does_not_matter(self, stored):
         signal = self.interpolated(stored)
-        found = as_archived(StampedSignal(signal.time, 2e-4 * signal.value))
-        expected = 2e-4 * as_archived(signal).value
+        found = archived(StampedSignal(signal.time, 2e-4 * signal.value))
+        expected = 2e-4 * archived(signal).value
         assert np.mean(np.isclose(found.value, expected, rtol=1e-12)) > 0.999
 
     @staticmethod
@@ -157,7 +163,7 @@ class TestArchived:
         small = self.lines(100, (0.5, 1.9), (4, 40)).value[:-1]
         large = self.lines(50, (25.0, 40.0), (4, 40)).value
         values = np.concatenate([small, large])
-        found = as_archived(StampedSignal(np.arange(float(values.size)), values)).value
+        found = archived(StampedSignal(np.arange(float(values.size)), values)).value
         assert not np.array_equal(found[: small.size], small)
         assert np.array_equal(found[small.size + 1 :], large[1:])
 
@@ -168,14 +174,25 @@ class TestArchived:
     )
     def test_lines_without_a_dead_band(self, count, changes, lengths):
         signal = self.lines(count, changes, lengths)
-        assert as_archived(signal) is signal
+        assert archived(signal) is signal
         other = self.lines(100, (0.5, 1.9), (4, 40))
-        assert as_archived(other) is not other
+        assert archived(other) is not other
+
+    def test_less_evidence_is_needed_beside_another_signal(self):
+        """Of the same record: its lines change by more than is enough alone."""
+        wide, usual = (self.lines(100, changes, (4, 40)) for changes in ((2.5, 4.0), (0.5, 1.9)))
+        assert archived(wide) is wide
+        other = self.lines(100, (2.5, 4.0), (4, 6))
+        assert as_archived(wide, other) == (wide, other)
+        held, beside, unlike = as_archived(usual, wide, other)
+        np.testing.assert_array_equal(held.value, archived(usual).value)
+        assert np.mean(np.diff(beside.value) == 0.0) > 0.8
+        assert unlike is other
 
     def test_a_fast_sensor_has_no_historian(self):
         signal = self.lines(100, (0.5, 1.9), (4, 40))
         fast = StampedSignal(0.1 * signal.time, signal.value)
-        assert as_archived(fast) is fast
+        assert archived(fast) is fast
 
     @pytest.mark.parametrize("step", [0.0, 0.01, 0.1, 1.0])
     @pytest.mark.parametrize("noise", [0.0, 0.03, 0.3])
@@ -186,7 +203,7 @@ class TestArchived:
         values = 50.0 * np.sin(2.0 * np.pi * self.TIME / period)
         values = values + noise * generator.standard_normal(4000)
         signal = StampedSignal(self.TIME, step * np.rint(values / step) if step else values)
-        assert as_archived(signal) is signal
+        assert archived(signal) is signal
 
     CURVE = 50.0 * np.sin(2.0 * np.pi * TIME / 400.0) + 3.0 * (TIME % 37 == 0)
     LEVELS = np.repeat(np.random.default_rng(8).uniform(0.0, 100.0, 40), 100)
@@ -198,23 +215,29 @@ class TestArchived:
     )
     def test_what_no_historian_has_stored_is_as_it_was(self, values):
         signal = StampedSignal(self.TIME, values)
-        assert as_archived(signal) is signal
+        assert archived(signal) is signal
 
 
 class TestDeadBand:
     TIME = np.arange(10_000.0)
 
+    @pytest.mark.parametrize("longest", [60, 10_000])
     @pytest.mark.parametrize("share", [0.3, 0.5])
     @pytest.mark.parametrize("band", [0.2, 0.5, 1.0])
-    def test_of_a_signal_that_is_sent_on_change(self, band, share):
-        """Levels with noise: no change is smaller, and most of them are little larger."""
+    def test_of_a_signal_that_is_sent_on_change(self, band, share, longest):
+        """Levels with noise: no change is smaller, and most of them are little larger.
+
+        Unless a value is also sent where none has been sent for the longest time.
+        """
         generator = np.random.default_rng(9)
         level = np.repeat(generator.uniform(0.0, 100.0, 100), 100)
         values = level + share * band * generator.standard_normal(10_000)
-        held = values.copy()
+        held, sent = values.copy(), 0
         for row in range(1, held.size):
-            if abs(values[row] - held[row - 1]) <= band:
+            if abs(values[row] - held[row - 1]) <= band and row - sent < longest:
                 held[row] = held[row - 1]
+            else:
+                sent = row
         found = archive_dead_band(StampedSignal(self.TIME, held))
         assert band < found < 1.3 * band
 

@@ -218,16 +218,17 @@ def _held(signal: StampedSignal, lines: _Lines | None) -> StampedSignal:
 
 
 _LEAST_HOLD, _LEAST_HELD = 3, 0.3
-_FEWEST_HOLDS = 20
+_FEWEST_HOLDS, _EARLY = 8, 0.9
 _BETWEEN, _SMALLEST = 2, 0.1
 _CONVERTER = 1.5
 """Conditions of a signal that a historian has held, and of its dead band.
 
-A hold has at least `_LEAST_HOLD` equal samples; there are `_FEWEST_HOLDS` of them, and they take
-the share `_LEAST_HELD` of the record. If the next hold is not among the `_BETWEEN` runs of equal
-samples that follow, the signal moves in between. No change is smaller than a dead band, so the
-`_SMALLEST` quantile of the changes is taken; one of up to `_CONVERTER` steps is the resolution of a
-converter."""
+A hold has at least `_LEAST_HOLD` equal samples; the holds take the share `_LEAST_HELD` of the
+record. At least `_FEWEST_HOLDS` of them end before `_EARLY` of the longest: a historian also stores
+a value when none has been stored for some time, however little it has changed. If the next hold is
+not among the `_BETWEEN` runs of equal samples that follow, the signal moves in between. No change
+is smaller than a dead band, so the `_SMALLEST` quantile of the changes is taken; one of up to
+`_CONVERTER` steps is the resolution of a converter."""
 
 
 def archive_dead_band(signal: StampedSignal) -> float:
@@ -243,7 +244,8 @@ def archive_dead_band(signal: StampedSignal) -> float:
     holds = np.flatnonzero(length >= _LEAST_HOLD)
     held, later = holds[:-1], holds[1:]
     further = value[first[np.stack([held + 1, later])]] - value[first[held]]
-    changes = np.abs(further).max(axis=0)[later - held <= _BETWEEN]
+    is_early = length[held] < _EARLY * length[holds].max(initial=0)
+    changes = np.abs(further).max(axis=0)[is_early & (later - held <= _BETWEEN)]
     changes = changes[changes <= _LARGEST_CHANGE * np.ptp(value)]
     if changes.size < _FEWEST_HOLDS or np.sum(length[holds]) < _LEAST_HELD * value.size:
         return 0.0

@@ -389,6 +389,22 @@ def two_digits(value: float) -> str:
     return f"{value:.2g}" if abs(value) < 99.5 else f"{value:.0f}"
 
 
+def three_digits(value: float) -> str:
+    """Write a number with three significant digits, or as an integer from 1000 on; no exponent."""
+    return f"{value:.3g}" if abs(value) < 999.5 else f"{value:.0f}"
+
+
+_UNITS_OF_TIME = (("days", 86400), ("h", 3600), ("min", 60))
+"""Units above the second, and their length, s."""
+
+
+def lasting(seconds: float) -> str:
+    """Write a duration with up to three digits in its largest unit: 0.02 s, 390 s, 23.5 min."""
+    longer = ((unit, length) for unit, length in _UNITS_OF_TIME if seconds >= 10 * length)
+    unit, length = next(longer, ("s", 1))
+    return f"{three_digits(seconds / length)} {unit}"
+
+
 def number_and_width(value: float, half_width: float) -> tuple[str, str]:
     """Write a number and half the width of its interval, to at most four digits."""
     if not math.isfinite(value):
@@ -549,8 +565,7 @@ def _ago(age: int) -> str:
     seconds = age / 1e9
     if seconds < 0:
         return "in the future: a clock has since been set back"
-    units = (("days", 86400), ("h", 3600), ("min", 60))
-    unit, length = next((one for one in units if seconds >= 2 * one[1]), ("s", 1))
+    unit, length = next((one for one in _UNITS_OF_TIME if seconds >= 2 * one[1]), ("s", 1))
     return f"{seconds // length:.0f} {unit} ago"
 
 

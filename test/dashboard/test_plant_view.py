@@ -37,7 +37,7 @@ from valve_friction_ros.dashboard.plant_rows import (
     summary,
 )
 from valve_friction_ros.health import Level, Ratio
-from valve_friction_ros.wording import number_and_width
+from valve_friction_ros.wording import lasting, number_and_width
 
 DAY = 86_400_000_000_000
 
@@ -221,6 +221,20 @@ def test_a_row_has_fixed_keys_only(plant):
 )
 def test_numbers_have_the_digits_that_their_intervals_leave(value, half_width, texts):
     assert number_and_width(value, half_width) == texts
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"),
+    [
+        (0.021, "0.021 s"),
+        (599.4, "599 s"),
+        (1410.0, "23.5 min"),
+        (86_400.0, "24 h"),
+        (9e8, "10417 days"),
+    ],
+)
+def test_a_duration_has_no_exponent(seconds, text):
+    assert lasting(seconds) == text
 
 
 def test_a_ratio_of_any_size_is_short():

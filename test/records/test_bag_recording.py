@@ -247,7 +247,7 @@ class TestBadSamples:
         recording = only(without(10, 30)).recording()
         assert recording.gap == (
             "gap of 0.02 s in /fv_101/actuator_pressure, 0.010 s after its first sample: use a "
-            "stretch of the record without it"
+            "stretch without it (--begin, --end)"
         )
         assert len(recording) == 50
         assert recording.stamped.drive.time.size == 31

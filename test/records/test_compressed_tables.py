@@ -117,7 +117,7 @@ def test_interpolated_values_are_held_and_widen_the_interval(export, monkeypatch
         tags.append((tag, time, np.interp(time, rows, values[rows])))
     recording = read(export(*tags)).recording()
     result = identify_plant(recording, BENCH_VALVE)
-    (note,) = (one for one in result.warnings if "lie on lines between stored values" in one)
+    (note,) = (one for one in result.warnings if " on lines between stored values" in one)
     assert note.startswith("the pressure and the stem ")
     assert_held(result.parameters, {"sliding_friction": truth})
     monkeypatch.setattr(method, "archive_dead_band", lambda _: 0.0)

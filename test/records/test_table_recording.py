@@ -465,7 +465,7 @@ class TestTimes:
         late = TIME + 0.02 * (np.arange(40) >= 10)
         record = read_csv(write([HEADER, *rows(late, POSITION, PRESSURE)]))
         assert record.gap == (
-            "row 12, column 'time_s': gap of 0.021 s: use a stretch of the record without it"
+            "row 12, column 'time_s': gap of 0.021 s: use a stretch without it (--begin, --end)"
         )
         assert len(record) == 60
         np.testing.assert_array_equal(record.stamped.position.value, POSITION)

@@ -383,7 +383,7 @@ class TestGaps:
 
     def test_a_year_is_refused_before_its_grid_is_made(self):
         stamps = np.concatenate((every(1, 500), every(1, 500, 365 * 24 * 3_600_000)))
-        with pytest.raises(RefusalError, match=r"^gap of 3\.15e\+07 s in actuator_pressure"):
+        with pytest.raises(RefusalError, match=r"^gap of 365 days in actuator_pressure"):
             uniform_recording(signal(stamps, pressure), signal(stamps, position))
 
     def test_of_the_longest(self):
@@ -434,7 +434,7 @@ class TestSentOnChange:
 
     def test_ten_minutes_at_most(self):
         stem = self.moves(rest=601_000)
-        with pytest.raises(RefusalError, match=r"^gap of 60\d s in stem_state"):
+        with pytest.raises(RefusalError, match=r"^gap of 10 min in stem_state"):
             uniform_recording(signal(every(1, 602_600), pressure), stem)
 
 

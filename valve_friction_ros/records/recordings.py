@@ -44,6 +44,7 @@ from valve_friction_ros.records.units import (
     span,
 )
 from valve_friction_ros.streams.samples import Samples, uniform_recording
+from valve_friction_ros.wording import lasting
 
 
 def _share(read: ReadSignal) -> NDArray[np.float64]:
@@ -222,7 +223,7 @@ def _recorded(
             lambda gap: (
                 f"row {by_name[gap.name].rows[gap.sample]}, column "
                 f"{table.clock_of(by_name[gap.name].signal)!r}: gap of "
-                f"{gap.seconds:.3g} s: {gap.remedy('use a stretch of the record without it')}"
+                f"{lasting(gap.seconds)}: {gap.remedy('use a stretch without it (--begin, --end)')}"
             ),
         )
     except RefusalError as refusal:

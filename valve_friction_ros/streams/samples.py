@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from valve_friction_ros.identification.refusal import LittleMotionError, RefusalError
 from valve_friction_ros.model.drive import Drive
 from valve_friction_ros.model.recording import Recording, StampedRecord, StampedSignal
-from valve_friction_ros.wording import percentage
+from valve_friction_ros.wording import lasting, percentage
 
 DAY = 86_400_000_000_000
 """A day, ns."""
@@ -384,7 +384,7 @@ class Gap:
     def what(self) -> str:
         """The refusal without its remedy."""
         return (
-            f"gap of {self.seconds:.3g} s in {self.name}, {self.since_start:.3f} s after its "
+            f"gap of {lasting(self.seconds)} in {self.name}, {self.since_start:.3f} s after its "
             "first sample"
         )
 
@@ -406,8 +406,8 @@ class Gap:
         if self.bunches and self.is_most:
             return (
                 f"the time stamps of {self.name} come in {self.bunches} bunches, "
-                f"{self.seconds:.3g} s apart: stamp each sample with the time of its measurement, "
-                "not of its arrival"
+                f"{lasting(self.seconds)} apart: stamp each sample with the time of its "
+                "measurement, not of its arrival"
             )
         usual = "use a record without a gap, or clear the buffer and record again"
         return f"{self.what}: {self.remedy(usual)}"
@@ -511,7 +511,8 @@ def uniform_recording(
         apart = (position.stamps[0] - drive.stamps[0]) / 1e9
         raise RefusalError(
             f"{names[0]} and {names[1]} do not overlap in time ({names[int(apart > 0)]} begins "
-            f"{abs(apart):.3g} s later): check that their clocks agree and that both are recorded"
+            f"{lasting(abs(apart))} later): check that their clocks agree and that both are "
+            "recorded"
         )
     origin = inside[0]
     grid = np.arange(0, inside[-1] - origin + 1, period, dtype=np.float64)

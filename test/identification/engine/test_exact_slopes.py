@@ -237,3 +237,14 @@ class TestSensitivity:
         at = {**TRUTH, "start_position": model.record.start, "slip_force": 0.0}
         found = model.sensitivity(at, ("coulomb_friction", "slip_force"), model.readings(at))
         assert np.abs(found[:, 1]).max() > 0.1
+
+    @pytest.mark.parametrize("endless", [np.inf, np.nan, -1e200])
+    def test_a_derivative_without_bounds_is_none(self, model, monkeypatch, endless):
+        """At each event of a stem that sticks and slips without end, it may have grown."""
+        at, names = {**TRUTH, "start_position": model.record.start}, ("coulomb_friction", "mass")
+        slopes = model.sensitivity(at, names, model.readings(at))
+        overflown = slopes.copy()
+        overflown[0, 1, 700:] = endless
+        monkeypatch.setattr(BroadModel, "_exact_slopes", lambda *_: overflown.copy())
+        found = model.sensitivity(at, names, model.readings(at))
+        np.testing.assert_array_equal(found, np.where(overflown == slopes, slopes, 0.0))

@@ -57,6 +57,11 @@ The main coordinates nearly compensate one another, so their derivatives must be
 digits and more; the simulation is exact, so the step may be small."""
 
 
+_STEEPEST = 1e100
+"""Derivative beyond which nothing is left of it but overflow: it grows at each event of a stem that
+sticks and slips without end."""
+
+
 class Simulated(NamedTuple):
     """The stem at each step, position (m) and velocity (m/s), and the number of events."""
 
@@ -169,6 +174,7 @@ class BroadModel:
             step = self.step(at, name)
             after = self.readings(physical({**centre, name: centre[name] + step}, names))
             slopes[:, names.index(name)] = (after - readings) / step
+        slopes[~(np.abs(slopes) < _STEEPEST)] = 0.0
         return slopes
 
     def _exact_slopes(self, at: Coordinates, names: tuple[str, ...]) -> NDArray[np.float64]:

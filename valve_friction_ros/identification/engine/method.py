@@ -92,7 +92,7 @@ from valve_friction_ros.identification.trust.verdict import (
 from valve_friction_ros.model.recording import Recording, StampedRecord, StampedSignal
 from valve_friction_ros.model.valve import KarnoppParameters, Valve
 from valve_friction_ros.signals import MeasuredRecord, measured
-from valve_friction_ros.wording import two_digits
+from valve_friction_ros.wording import lasting, three_digits, two_digits
 
 _WINDOWS, _SHORTEST_WINDOW = 10, 3
 """Means of the position in which a record must show both directions, and fewest samples in each:
@@ -241,8 +241,8 @@ def _of_stretch(part: MovingPart) -> tuple[str, ...]:
     if not part.is_stretch:
         return ()
     return (
-        f"used the {part.duration / 60:.3g} min with the most stem travel out of "
-        f"{part.motion / 60:.3g} min of motion",
+        f"used the {lasting(part.duration)} with the most stem travel out of "
+        f"{lasting(part.motion)} of motion",
     )
 
 
@@ -302,9 +302,8 @@ def _of_simulation(
         raise RefusalError(
             f"no friction model reproduces the record (fit {100 * misfit.fit:.0f} %, "
             f"{misfit.systematic * 1e3:.2g} mm misfit): check that both signals belong to this "
-            "valve, check their units, and check that the stem reaches both ends of the travel; "
-            "if the packing or the pressure of the process changed during the record, clear the "
-            "buffer and record again"
+            "valve, their units and the travel; if the packing or the pressure of the process "
+            "changed, or most moves are faster than the samples, use another stretch"
         )
     if profile.has_imperfections:
         follows = not verdicts.split_doubt(fits, misfit, profile, prior.lag.reach)
@@ -381,14 +380,16 @@ def _as_sampled(
     """
     by_sample = curves[0].by_sample if curves and lag.deviation is None else 0.0
     interval = max(without_repeats(one).period for one in (record.drive, record.position))
-    doubted = verdicts.doubted_by_sampling(outcome.parameters, by_sample, interval)
+    doubted = verdicts.doubted_by_sampling(
+        outcome.parameters, by_sample, interval, curves[0].fit if curves else 1.0
+    )
     known = outcome.numbers.get(SLIDING)
     if levels is None or (lag.is_known and known is not levels.numbers[SLIDING]):
         return outcome._replace(parameters=doubted)
     level, reason = levels.numbers[SLIDING], verdicts.BY_LEVELS
     shown = (
-        f"the levels at which force and stem rest show a sliding friction of {level.value:.3g} ± "
-        f"{two_digits(level.half_width)} N"
+        f"the levels at which force and stem rest show a sliding friction of "
+        f"{three_digits(level.value)} ± {two_digits(level.half_width)} N"
     )
     if known is not None and known is not level and known.value > 0:
         apart = abs(known.value - level.value)
@@ -509,7 +510,8 @@ def stamped_record(recording: Recording) -> StampedRecord:
     excitation.require_unbroken(recording)
     time = recording.time
     drive, position = (StampedSignal(time, one) for one in (recording.drive, recording.position))
-    return StampedRecord(*as_archived(drive, position), recording.driven_by)
+    drive, position = as_archived(drive, position)
+    return StampedRecord(drive, position, recording.driven_by)
 
 
 def prior_of(

@@ -25,7 +25,7 @@ from valve_friction_ros.identification.trust.plausible_units import position_que
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.signals import measured
-from valve_friction_ros.wording import percentage
+from valve_friction_ros.wording import lasting, percentage
 
 _LEAST_WINDOWS = 10
 """Derivative windows in a record. Chosen: fewer give no two strokes with a rest and a motion."""
@@ -122,13 +122,13 @@ def require_enough_samples(recording: Recording, window: int) -> None:
     """
     if not _SHORTEST_PERIOD <= recording.sample_period <= _LONGEST_PERIOD:
         raise RefusalError(
-            f"a sample every {recording.sample_period:.3g} s is not plausible for a valve: check "
-            "the time unit"
+            f"a sample every {lasting(recording.sample_period)} is not plausible for a valve: "
+            "check the time unit"
         )
     least = _LEAST_WINDOWS * window
     if len(recording) < least:
         raise LittleMotionError(
-            f"the record is too short: {len(recording)} samples ({recording.duration:.3g} s), "
+            f"the record is too short: {len(recording)} samples ({lasting(recording.duration)}), "
             f"at least {least} are needed; record longer or sample faster"
         )
 
@@ -150,9 +150,9 @@ def require_motion(recording: Recording, travel: float = math.inf) -> None:
     if span == 0 or span < _MOTION_OVER_NOISE * noise:
         if span > _SEVERAL_PERCENT * travel:
             raise RefusalError(
-                f"the stem jumps from sample to sample, {recording.sample_period:.3g} s apart (its "
-                f"position spans {span * 1e6:.3g} µm with {noise * 1e6:.3g} µm of noise or unseen "
-                "motion): sample faster, or check the stem sensor"
+                f"the stem jumps from sample to sample, {lasting(recording.sample_period)} apart "
+                f"(its position spans {span * 1e6:.3g} µm with {noise * 1e6:.3g} µm of noise or "
+                "unseen motion): sample faster, or check the stem sensor"
             )
         raise LittleMotionError(
             f"the stem did not move: its position spans {span * 1e6:.3g} µm with "
@@ -305,7 +305,8 @@ def require_related_signals(recording: Recording) -> None:
         raise RefusalError(
             f"{words} and stem do not move together (position and direction of the moving stem "
             f"explain {100 * share:.0f} % of the {words}): check that both signals belong to this "
-            "valve, are not swapped, come from working sensors, and that they share one clock"
+            "valve, are not swapped, come from working sensors and share one clock, and that the "
+            "stem moves further than its friction holds it"
         )
     if slope < 0 and share > _SURELY_FOLLOWED and not dissipates:
         raise RefusalError(
@@ -322,6 +323,6 @@ def require_related_signals(recording: Recording) -> None:
         remedy = "export it without compression, " if is_held else ""
         raise RefusalError(
             f"sampling is too slow for the motion: the stem moves {100 * step / span:.0f} % of "
-            f"its range between two samples, {recording.sample_period:.3g} s apart; {remedy}sample "
-            "faster, or check the stem sensor for a glitch"
+            f"its range between two samples, {lasting(recording.sample_period)} apart; {remedy}"
+            "sample faster, or check the stem sensor for a glitch"
         )

@@ -408,7 +408,7 @@ class ValveFeed:
             snapshot.position,
             names,
             refusal_of=lambda gap: (
-                f"{gap.what}: {gap.remedy('use a stretch of the record without it')}"
+                f"{gap.what}: {gap.remedy('use a stretch without it (--begin, --end)')}"
             ),
         )
 
