@@ -10,6 +10,7 @@
 """Bags: which topics are a valve's, what is written, and what is used of rosbags for it."""
 
 import os
+import time
 from pathlib import Path
 
 import numpy as np
@@ -209,6 +210,19 @@ def test_a_folder_that_cannot_be(tmp_path, buffer):
     (tmp_path / "file").write_text("")
     with pytest.raises(OSError, match="Not a directory"):
         write(tmp_path / "file" / "folder", buffer)
+
+
+def test_a_leftover_of_a_killed_process_goes_after_a_day(tmp_path, buffer):
+    """No other folder does, and none with a strange file in it."""
+    names = (".saving_old", ".saving_new", ".saving_strange", "saving")
+    for name in names:
+        (tmp_path / name / "fv_101").mkdir(parents=True)
+    (tmp_path / ".saving_strange" / "note.txt").touch()
+    day_ago = time.time() - 86_500.0
+    for name in names[::2] + names[3:]:
+        os.utime(tmp_path / name, (day_ago, day_ago))
+    bag = write(tmp_path, buffer)
+    assert {one.name for one in tmp_path.iterdir()} == {bag.name, *names[1:]}
 
 
 FULL_DISK = """

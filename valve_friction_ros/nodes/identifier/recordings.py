@@ -11,7 +11,6 @@
 
 import contextlib
 import re
-import shutil
 import time
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -177,8 +176,6 @@ _DESCRIPTION = "metadata.yaml"
 """The file that marks a folder as a bag."""
 _BESIDE = re.compile(rf"valve\.yaml|(\.\d+_)?{re.escape(PAGE)}")
 """Files next to the bag, including the draft of a page."""
-_STALE = 86_400.0
-"""Age, s, from which an unfinished bag is considered a leftover of a killed node."""
 
 
 def _size_of(recording: Path) -> int:
@@ -206,8 +203,8 @@ def remove_oldest(
     began, while the others show a fluctuating level.
 
     Only folders that are named like such a recording and contain nothing else are considered. The
-    `new` recording is included in the limits but never removed. Leftovers of a killed node for this
-    valve are removed after a day. Raises OSError if something cannot be removed.
+    `new` recording is included in the limits but never removed. Raises OSError if something cannot
+    be removed.
     """
     pattern = re.compile(rf"alarm_{re.escape(valve)}_(\d{{8}}T\d{{6}}Z)_(WARN|ERROR)(?:_(\d+))?")
     found: dict[Path, tuple[str, int, str]] = {}
@@ -216,8 +213,6 @@ def remove_oldest(
             continue
         if (name := pattern.fullmatch(place.name)) and _is_recording(place):
             found[place] = name[1], int(name[3] or 1), name[2]
-        elif place.name.startswith(".saving_") and _is_left(place, pattern):
-            shutil.rmtree(place)
     oldest = _useless_first(found)
     if new in oldest:
         oldest.remove(new)
@@ -250,13 +245,6 @@ def _is_written(file: Path) -> bool:
     """Return whether the node writes files of this name into this folder."""
     name, folder = file.name, re.sub(r"_\d+$", "", file.parent.name)  # without its running number
     return name in (_DESCRIPTION, f"{folder}.mcap") or _BESIDE.fullmatch(name) is not None
-
-
-def _is_left(workplace: Path, pattern: re.Pattern[str]) -> bool:
-    """Return whether a folder is the leftover of a killed node: an old unfinished bag."""
-    names = [one.name for one in workplace.iterdir()]
-    is_old = time.time() - workplace.stat().st_mtime > _STALE
-    return is_old and len(names) == 1 and pattern.fullmatch(names[0]) is not None
 
 
 _LATE = 1.0

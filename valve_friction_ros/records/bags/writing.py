@@ -16,6 +16,7 @@ import os
 import shutil
 import struct
 import tempfile
+import time
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from pathlib import Path
@@ -111,6 +112,20 @@ def _moved(whole: Path, folder: Path, name: str) -> Path:
         target = folder / f"{name}_{number}"
 
 
+_WORKPLACE = ".saving_"
+_STALE = 86_400.0
+"""Prefix of the hidden folders, and the age, s, from which one is left of a killed process."""
+
+
+def _remove_leftovers(folder: Path) -> None:
+    """Remove the unfinished bags of killed processes, as far as that is possible."""
+    for place in folder.glob(f"{_WORKPLACE}*"):
+        with contextlib.suppress(OSError):
+            is_stale = time.time() - place.stat().st_mtime > _STALE
+            if is_stale and all(one.is_dir() for one in place.iterdir()):
+                shutil.rmtree(place)
+
+
 def write_bag(
     folder: Path,
     name: str,
@@ -138,7 +153,8 @@ def write_bag(
     if np.abs(stamps).max() > _LARGEST_STAMP:
         raise RefusalError("there are stamps after the year 2038, which no message header can hold")
     folder.mkdir(parents=True, exist_ok=True)
-    workplace = Path(tempfile.mkdtemp(prefix=".saving_", dir=folder))
+    _remove_leftovers(folder)
+    workplace = Path(tempfile.mkdtemp(prefix=_WORKPLACE, dir=folder))
     try:
         whole = workplace / name
         _write(whole, snapshot, names)
