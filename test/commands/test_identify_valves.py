@@ -79,7 +79,7 @@ def test_other_methods_refuse_a_gap(refusal, write_csv, columns_of, noisy, bench
     columns = {name: column[kept] for name, column in columns_of(noisy).items()}
     broken = write_csv(columns, "broken.csv")
     assert refusal(broken, *bench_options, "--method", method).startswith(
-        f"{broken}: row 402, column 'time_s': gap of 0.51 s: use a stretch of the record"
+        f"{broken}: row 402, column 'time_s': gap of 0.51 s: use a stretch without it"
     )
 
 

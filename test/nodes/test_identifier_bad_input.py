@@ -100,7 +100,7 @@ BAD_INPUTS = {  # what is published, how many samples of it are taken, words of 
         "has no position for the joint (1 samples)",
     ),
     "pressure too high": (bad_pressure(260e3), 999, *OUTSIDE),
-    "apart in time": (apart, 1000, "do not overlap", "3.6e+03 s later"),
+    "apart in time": (apart, 1000, "do not overlap", "60 min later"),
 }
 GAPS = {"gap": (gap, 850), "gap of stem": (gap_of_stem, 925)}
 

@@ -195,7 +195,7 @@ _FAR = 0.5
 """Share of that work by which a fit may differ from it before it is doubted, however well it
 follows the stem: a lag alone explains less."""
 
-ROUNDING, ARCHIVE = "rounding", "archive"
+ROUNDING, ARCHIVE, UNSEEN = "rounding", "archive", "unseen"
 """Sources of the uncertainty of a number: the step of the converter of the force, and the dead band
 of a historian."""
 

@@ -24,6 +24,7 @@ from valve_friction_ros.identification.engine.intervals import (
     NOISE_LIKE,
     NOT_QUITE,
     ROUNDING,
+    UNSEEN,
     Estimated,
 )
 from valve_friction_ros.identification.engine.posterior_fit import PosteriorFit
@@ -58,6 +59,7 @@ _OTHERS = {
     "start_position": "initial stem position",
     ROUNDING: "force within one step of the converter",
     ARCHIVE: "changes within the dead band of the historian",
+    UNSEEN: "what happens between two samples",
 }
 """Words for the sources of uncertainty that are not imperfections."""
 
