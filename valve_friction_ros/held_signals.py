@@ -176,9 +176,9 @@ def _lines_of(signal: StampedSignal) -> _Lines | None:
     return _Lines(step, first, last - first, change, is_line, is_long & ~moves, off[stored[1:-1]])
 
 
-def _is_archived(signal: StampedSignal, lines: _Lines | None, evidence: _Evidence) -> bool:
+def _is_archived(signal: StampedSignal, lines: _Lines, evidence: _Evidence) -> bool:
     """Return whether a signal shows that much evidence of a historian."""
-    if lines is None or np.count_nonzero(lines.is_line) < evidence.lines:
+    if np.count_nonzero(lines.is_line) < evidence.lines:
         return False
     length, change = lines.length[lines.is_line], np.abs(lines.change[lines.is_line])
     changing = signal.value.size - float(np.sum(lines.length[lines.is_still]))
@@ -199,16 +199,15 @@ def as_archived(*signals: StampedSignal) -> tuple[StampedSignal, ...]:
     signals are returned unchanged, and so is one that is sampled faster than historians do. Where
     one signal of a record is interpolated, less evidence is needed for the others.
     """
-    lines = [_lines_of(signal) for signal in signals]
-    pairs = list(zip(signals, lines, strict=True))
-    if not any(_is_archived(signal, of, _ALONE) for signal, of in pairs):
+    pairs = [(signal, _lines_of(signal)) for signal in signals]
+    if not any(lines and _is_archived(signal, lines, _ALONE) for signal, lines in pairs):
         return signals
-    return tuple(_held(signal, of) for signal, of in pairs)
+    return tuple(_held(signal, lines) if lines else signal for signal, lines in pairs)
 
 
-def _held(signal: StampedSignal, lines: _Lines | None) -> StampedSignal:
+def _held(signal: StampedSignal, lines: _Lines) -> StampedSignal:
     """Hold the stored values of a signal, beside or itself one that is interpolated."""
-    if lines is None or not _is_archived(signal, lines, _BESIDE):
+    if not _is_archived(signal, lines, _BESIDE):
         return signal
     is_small = np.abs(lines.change) <= _LARGEST_CHANGE * np.ptp(signal.value)
     held = np.repeat(lines.is_line & is_small, lines.length)

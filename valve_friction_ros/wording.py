@@ -398,10 +398,14 @@ _UNITS_OF_TIME = (("days", 86400), ("h", 3600), ("min", 60))
 """Units above the second, and their length, s."""
 
 
+def _unit_of_time(seconds: float, least: int) -> tuple[str, int]:
+    """Return the largest unit of which a time has so many, or the second, and its length, s."""
+    return next((one for one in _UNITS_OF_TIME if seconds >= least * one[1]), ("s", 1))
+
+
 def lasting(seconds: float) -> str:
     """Write a duration with up to three digits in its largest unit: 0.02 s, 390 s, 23.5 min."""
-    longer = ((unit, length) for unit, length in _UNITS_OF_TIME if seconds >= 10 * length)
-    unit, length = next(longer, ("s", 1))
+    unit, length = _unit_of_time(seconds, 10)
     return f"{three_digits(seconds / length)} {unit}"
 
 
@@ -565,7 +569,7 @@ def _ago(age: int) -> str:
     seconds = age / 1e9
     if seconds < 0:
         return "in the future: a clock has since been set back"
-    unit, length = next((one for one in _UNITS_OF_TIME if seconds >= 2 * one[1]), ("s", 1))
+    unit, length = _unit_of_time(seconds, 2)
     return f"{seconds // length:.0f} {unit} ago"
 
 

@@ -17,6 +17,9 @@ from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.streams.samples import nanoseconds
 
+WITHOUT_GAP = "use a stretch without it (--begin, --end)"
+"""What to do about a gap in a file."""
+
 
 @dataclass(frozen=True, eq=False)
 class RecordedValve:

@@ -27,7 +27,7 @@ from valve_friction_ros.records.bags.topics import TopicChoice, bag_libraries, i
 from valve_friction_ros.records.columns import Columns
 from valve_friction_ros.records.header_words import plain_name
 from valve_friction_ros.records.layout import TableSignal
-from valve_friction_ros.records.recorded_valve import RecordedValve, Stretch
+from valve_friction_ros.records.recorded_valve import WITHOUT_GAP, RecordedValve, Stretch
 from valve_friction_ros.records.table import (
     OpenTables,
     ReadSignal,
@@ -223,7 +223,7 @@ def _recorded(
             lambda gap: (
                 f"row {by_name[gap.name].rows[gap.sample]}, column "
                 f"{table.clock_of(by_name[gap.name].signal)!r}: gap of "
-                f"{lasting(gap.seconds)}: {gap.remedy('use a stretch without it (--begin, --end)')}"
+                f"{lasting(gap.seconds)}: {gap.remedy(WITHOUT_GAP)}"
             ),
         )
     except RefusalError as refusal:

@@ -174,25 +174,6 @@ class TestSlowRecord:
         assert found[SLIDING].value == pytest.approx(FRICTION, rel=0.02)
         assert found[SLIDING].half_width == pytest.approx(abs(late) * 375.0 / 20.0, rel=0.15)
 
-    @pytest.mark.parametrize(
-        ("interval", "reproduced", "verdict"),
-        [
-            (1.0, 0.61, Verdict.IDENTIFIED),
-            (1.0, 0.59, Verdict.NOT_IDENTIFIABLE),
-            (0.1, 0.59, Verdict.IDENTIFIED),
-        ],
-    )
-    def test_a_balance_that_hardly_reproduces_the_force(self, interval, reproduced, verdict):
-        """Of a slow record: its moves are faster than its samples."""
-        sliding = Parameter(SLIDING, 100.0, 2.5, 5.0, Verdict.IDENTIFIED)
-        coulomb = Parameter("coulomb_friction", 90.0, 2.0, 4.0, Verdict.IDENTIFIED)
-        given = {one.name: one for one in (sliding, coulomb)}
-        found = doubted_by_sampling(given, 0.0, interval, reproduced)
-        assert found[SLIDING].verdict is verdict
-        if verdict is Verdict.NOT_IDENTIFIABLE:
-            assert "reproduces only 59 % of the force" in found[SLIDING].reason
-            assert found["coulomb_friction"].verdict is Verdict.WEAK
-
     def test_stated_as_synchronous(self):
         """There the moves need no check."""
         settings = IdentificationSettings(timing_uncertainty=0.0)

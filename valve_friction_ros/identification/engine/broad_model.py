@@ -56,7 +56,6 @@ _STEP = 1e-5
 The main coordinates nearly compensate one another, so their derivatives must be good to four
 digits and more; the simulation is exact, so the step may be small."""
 
-
 _STEEPEST = 1e100
 """Derivative beyond which nothing is left of it but overflow: it grows at each event of a stem that
 sticks and slips without end."""
@@ -174,7 +173,8 @@ class BroadModel:
             step = self.step(at, name)
             after = self.readings(physical({**centre, name: centre[name] + step}, names))
             slopes[:, names.index(name)] = (after - readings) / step
-        slopes[~(np.abs(slopes) < _STEEPEST)] = 0.0
+        if not max(slopes.max(initial=0.0), -slopes.min(initial=0.0)) < _STEEPEST:
+            slopes[~(np.abs(slopes) < _STEEPEST)] = 0.0
         return slopes
 
     def _exact_slopes(self, at: Coordinates, names: tuple[str, ...]) -> NDArray[np.float64]:

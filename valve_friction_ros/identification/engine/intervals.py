@@ -196,8 +196,8 @@ _FAR = 0.5
 follows the stem: a lag alone explains less."""
 
 ROUNDING, ARCHIVE, UNSEEN = "rounding", "archive", "unseen"
-"""Sources of the uncertainty of a number: the step of the converter of the force, and the dead band
-of a historian."""
+"""Sources of the uncertainty of a number: the step of the converter of the force, the dead band of
+a historian, and what happens between two of its samples."""
 
 _FINEST = {SLIDING: FINEST_SLIDING, "spring_constant": 2e-4}
 _FINEST_OTHER = 5e-4

@@ -48,7 +48,7 @@ from valve_friction_ros.records.bags.topics import (
     first_bytes,
     valves_in,
 )
-from valve_friction_ros.records.recorded_valve import RecordedValve, Stretch
+from valve_friction_ros.records.recorded_valve import WITHOUT_GAP, RecordedValve, Stretch
 from valve_friction_ros.streams.record_buffer import RecordBuffer
 from valve_friction_ros.streams.samples import joint_position, only_joint, uniform_recording
 
@@ -407,9 +407,7 @@ class ValveFeed:
             snapshot.pressure,
             snapshot.position,
             names,
-            refusal_of=lambda gap: (
-                f"{gap.what}: {gap.remedy('use a stretch without it (--begin, --end)')}"
-            ),
+            refusal_of=lambda gap: f"{gap.what}: {gap.remedy(WITHOUT_GAP)}",
         )
 
 
