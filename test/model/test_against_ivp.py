@@ -44,6 +44,7 @@ RTOL, ATOL = 1e-10, 1e-13
 AGREED_POSITION = 1e-9  # m
 AGREED_VELOCITY = 1e-9  # m/s
 BY_CHORDS = 1e-7  # m
+STEM_NOISE = 28.6e-6  # m, of the sensor of the paper's bench
 
 
 def leaves(position, pull, slope, duration, valve, parameters):
@@ -182,6 +183,29 @@ def test_bench(name, wave):
     else:
         assert np.abs(found.position - position).max() < AGREED_POSITION
         assert np.abs(found.velocity - velocity).max() < AGREED_VELOCITY
+
+
+@pytest.mark.parametrize(("stribeck_velocity", "ratio"), [(1e-3, 1.3), (3e-3, 2.0)])
+def test_stick_slip(stribeck_velocity, ratio):
+    """A stem that jumps: an error in one jump delays the next."""
+    packing = replace(
+        GRAPHITE_PACKING,
+        viscous_friction=3e3,
+        static_friction=ratio * GRAPHITE_PACKING.coulomb_friction,
+        stribeck_velocity=stribeck_velocity,
+    )
+    between = 100
+    knots = np.arange(0.0, 30.0 + 1e-9, between * SAMPLE_PERIOD)
+    pressure = converter_response(WAVES["triangle"][0].sample(knots), between * SAMPLE_PERIOD)
+    times = np.arange((knots.size - 1) * between + 1) * SAMPLE_PERIOD
+    found = simulate(GRAPHITE_VALVE, packing, np.interp(times, knots, pressure), SAMPLE_PERIOD)
+    position, _ = integrate(
+        GRAPHITE_VALVE, packing, knots, pressure, times, float(found.position[0])
+    )
+    starts = np.diff((found.velocity == 0).astype(int)) == -1
+    assert np.count_nonzero(starts) > 10
+    error = np.sqrt(np.mean((found.position - position) ** 2))
+    assert error < STEM_NOISE
 
 
 @pytest.mark.parametrize("name", ["low", "high", "graphite"])

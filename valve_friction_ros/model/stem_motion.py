@@ -169,13 +169,16 @@ def _slide_up(
 
 @compiled
 def _chord(dynamics: Dynamics, speed: float, other: float) -> Dynamics:
-    """Linearise Stribeck friction between two different speeds, exact at `speed`.
+    """Linearise Stribeck friction between two different speeds.
 
     Where friction falls with the speed faster than its viscous part rises, the chord is taken
-    level, which keeps the motion within a step monotone.
+    level at the mean of both ends, which keeps the motion within a step monotone.
     """
     friction = sliding_friction(dynamics, speed)
-    slope = max((sliding_friction(dynamics, other) - friction) / (other - speed), 0.0)
+    change = sliding_friction(dynamics, other) - friction
+    slope = max(change / (other - speed), 0.0)
+    if slope == 0.0:
+        friction += 0.5 * change
     return Dynamics(
         dynamics.mass,
         slope,
@@ -217,14 +220,16 @@ def _slide_one_way(
         start = Motion(position, speed, excess / dynamics.mass)
         reached, final, time = _slide_up(start, dynamics, force, slope, duration, stop)
         return reached, final, time, dynamics
-    start = Motion(position, speed, (pull - sliding_friction(dynamics, speed)) / dynamics.mass)
+    acceleration = (pull - sliding_friction(dynamics, speed)) / dynamics.mass
     largest = _chord_reach(dynamics, speed)
-    change = abs(start.acceleration) * duration
+    change = abs(acceleration) * duration
     step = duration if change <= largest else duration * largest / change
     for _ in range(_MOST_TRIES):
-        gain = min(max(start.acceleration * step, -0.5 * speed), largest)
+        gain = min(max(acceleration * step, -0.5 * speed), largest)
         other = speed + (gain if abs(gain) > _NARROW * largest else _NARROW * largest)
         local = _chord(dynamics, speed, other)
+        push = pull - local.coulomb_friction - local.viscous_friction * speed
+        start = Motion(position, speed, push / dynamics.mass)
         reached, final, time = _slide_up(start, local, force, slope, step, stop)
         strays = abs(final - speed)
         allowed = min(largest, _chord_reach(dynamics, final))

@@ -244,15 +244,21 @@ def carry_slide(tangent: Tangent, phase: Phase) -> None:
     response = impulse_response(damping, stiffness, time)
     lost = self_convolution(damping, stiffness, time, response)
     end = motion_after(Motion(phase.position, speed, acceleration), jerk, response, time)
-    fall = friction_fall(phase.way, speed)
-    by_stribeck = 0.5 * (fall.by_stribeck + friction_fall(phase.way, end.velocity).by_stribeck)
+    fall, later = friction_fall(phase.way, speed), friction_fall(phase.way, end.velocity)
+    share = 0.5 * (fall.share + later.share)
+    by_stribeck = 0.5 * (fall.by_stribeck + later.by_stribeck)
+    falls = phase.way.stribeck_velocity > 0.0
+    if falls and speed > 0.0:
+        true = (phase.pull - sliding_friction(phase.way, speed)) / mass
+        if true != 0.0:
+            tangent.state[1] *= min(max(acceleration / true, 1.0 / _STEEPEST), _STEEPEST)
     for one in range(tangent.late.size):
         place, motion = side * tangent.state[0, one], side * tangent.state[1, one]
         of_spring, of_mass = tangent.spring_constant[one], tangent.mass[one]
         of_viscous = tangent.upward[one] if side > 0.0 else tangent.downward[one]
         force = side * (tangent.pull[one] + tangent.rate[one] * phase.begin)
         force -= tangent.coulomb_friction[one] + tangent.grip[one]
-        force -= tangent.slip_force[one] * fall.share
+        force -= tangent.slip_force[one] * share
         force -= tangent.stribeck_velocity[one] * by_stribeck
         force -= of_spring * phase.position + spring * place
         of_push = (force - of_viscous * speed - viscous * motion - acceleration * of_mass) / mass
@@ -272,7 +278,7 @@ def carry_slide(tangent: Tangent, phase: Phase) -> None:
         tangent.state[:] = 0.0
     elif phase.end == RESTS:
         _come_to_rest(tangent, side, end, way.limit_velocity)
-    elif phase.way.stribeck_velocity > 0.0 and end.acceleration != 0.0:
+    elif falls and end.acceleration != 0.0:
         left = way.coulomb_friction + viscous * end.velocity
         change = (left - sliding_friction(phase.way, end.velocity)) / mass
         tangent.state[1] *= min(max(1.0 + change / end.acceleration, 1.0 / _STEEPEST), _STEEPEST)
