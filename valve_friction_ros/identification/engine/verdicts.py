@@ -47,7 +47,7 @@ from valve_friction_ros.identification.trust.verdict import (
 )
 from valve_friction_ros.model.recording import Recording, StampedRecord, StampedSignal
 from valve_friction_ros.signals import quantisation_step, stamped_noise
-from valve_friction_ros.wording import lasting, percentage, three_digits, two_digits
+from valve_friction_ros.wording import LAG_SETTING, lasting, percentage, three_digits, two_digits
 
 _SURE = 3.0
 _LEAST_SLIP = 0.1
@@ -133,7 +133,7 @@ def late_sensor(name: str, value: float) -> str:
     unit = UNITS.get(name, "N")
     return (
         f"it would be {value:.3g} {unit} with a slow stem sensor, whose lag the record cannot "
-        "separate from viscous friction; set timing_uncertainty"
+        f"separate from viscous friction; state {LAG_SETTING}"
     )
 
 
@@ -459,7 +459,7 @@ def doubted_by_sampling(
         return dict(parameters)
     reason = (
         f"one signal recorded a sample ({lasting(interval)}) late would change the sliding "
-        f"friction by {three_digits(abs(change))} N; set timing_uncertainty, 0 if both signals are "
+        f"friction by {three_digits(abs(change))} N; state {LAG_SETTING}: 0 if both signals are "
         "sampled together"
     )
     if abs(change) > abs(sliding.value):
