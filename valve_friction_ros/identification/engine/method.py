@@ -440,8 +440,8 @@ def _as_stored(outcome: _Outcome, record: StampedRecord, valve: Valve, lag: LagP
     unseen = 0.0
     if is_slow and lag.deviation is None:
         unseen = _UNSEEN * abs(outcome.numbers[SLIDING].value) / NORMAL_QUANTILE
-    hidden = {name: one for name, one in ((ARCHIVE, banded), (UNSEEN, unseen)) if one > 0.0}
-    if not hidden:
+    hidden = {ARCHIVE: banded, UNSEEN: unseen}
+    if not any(hidden.values()):
         return outcome
     total = math.hypot(*hidden.values())
     parameters, numbers = dict(outcome.parameters), dict(outcome.numbers)
@@ -453,7 +453,10 @@ def _as_stored(outcome: _Outcome, record: StampedRecord, valve: Valve, lag: LagP
             one,
             half_width=math.hypot(one.half_width, NORMAL_QUANTILE * total),
             record=math.hypot(one.record, total),
-            sources={**one.sources, **hidden},
+            sources={
+                **one.sources,
+                **{name: math.hypot(one.sources.get(name, 0.0), d) for name, d in hidden.items()},
+            },
         )
         if math.isfinite(known.value):
             width = math.hypot(known.half_width, NORMAL_QUANTILE * total)
