@@ -266,6 +266,13 @@ class TestStretch:
 class TestColumns:
     """What is missing or ambiguous is asked for at once, each with its option."""
 
+    def test_the_file_of_the_other_signal_is_asked_for(self, write):
+        message = refused(write(["time_s,pressure_pa", *rows(TIME, PRESSURE)]))
+        assert message.startswith(
+            "cannot tell which column is the position, of time_s, pressure_pa (--position-column); "
+            "if another file holds it, give both files"
+        )
+
     @pytest.mark.parametrize(
         ("header", "asked"),
         [

@@ -178,7 +178,7 @@ def _identified(
         departed = static_friction(record, valve, balanced, lag)
     static = math.nan if departed is None else departed.static_friction.value
     try:
-        excitation.require_related_signals(uniform)
+        excitation.require_related_signals(recording)
         outcome = _of_simulation(record, valve, settings, profile, curves, balanced, static)
     except RefusalError as refusal:
         if not _dissipates(balanced):
@@ -304,7 +304,8 @@ def _of_simulation(
             f"no friction model reproduces the record (fit {100 * misfit.fit:.0f} %, "
             f"{misfit.systematic * 1e3:.2g} mm misfit): check that both signals belong to this "
             "valve, their units and the travel; if the packing or the pressure of the process "
-            "changed, or most moves are faster than the samples, use another stretch"
+            "changed, use another stretch; if most moves are faster than the samples, "
+            f"{lasting(max(record.drive.period, record.position.period))} apart, sample faster"
         )
     if profile.has_imperfections:
         follows = not verdicts.split_doubt(fits, misfit, profile, prior.lag.reach)
@@ -653,7 +654,7 @@ def expected_half_widths(
     """
     settings = settings or IdentificationSettings()
     require_moving_stem(measured(recording), valve, settings)
-    excitation.require_related_signals(measured(recording))
+    excitation.require_related_signals(recording)
     truth = {
         "coulomb_friction": parameters.coulomb_friction,
         "viscous_friction": parameters.viscous_friction,
