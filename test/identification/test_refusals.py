@@ -192,7 +192,9 @@ def test_a_pressure_that_is_too_slow_for_the_moves():
         stem.value,
         stamped=StampedRecord(minutes, stem),
     )
-    refused(record, r"^pressure and .* it; a pressure every 60 s does not show shorter moves$")
+    message = r"^pressure and .* it; a pressure every 60 s does not show shorter moves$"
+    with pytest.raises(RefusalError, match=message):
+        identify_plant(record, BENCH_VALVE, SETTINGS)
 
 
 def test_position_counted_the_wrong_way(healthy):
