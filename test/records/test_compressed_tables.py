@@ -273,3 +273,17 @@ def test_jittering_stamps_of_a_logger_are_not_compressed(export):
     stem = 50.0 + 40.0 * np.sin(time / 100.0)
     found = read(export(("FV-7.PT", time, 1.0 + stem / 200), ("FV-7.ZT", time, stem)))
     assert "is compressed" not in str(found.notes)
+
+
+def test_repeated_values_are_scanned_as_slowly_as_they_change(export, monkeypatch):
+    """An export five times a second of values read once a second hides as much between them."""
+    pressure, stem, _ = sampled(0)
+    begin = slice(0, 2400)
+    rows = np.arange(0.0, 2400.0, 0.2)
+    tags = (("FV-7.PT", pressure[begin]), ("FV-7.ZT", stem[begin]))
+    recording = read(export(*((tag, rows, np.repeat(y, 5)) for tag, y in tags))).recording()
+    found = identify_plant(recording, BENCH_VALVE).parameters["sliding_friction"]
+    monkeypatch.setattr(method, "_UNSEEN", 0.0)
+    plain = identify_plant(recording, BENCH_VALVE).parameters["sliding_friction"]
+    added = np.sqrt(found.half_width**2 - plain.half_width**2)
+    assert added == pytest.approx(0.04 * found.value, rel=1e-6)

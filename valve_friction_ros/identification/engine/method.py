@@ -366,6 +366,11 @@ def _with_departures(outcome: _Outcome, departed: Departed | None) -> _Outcome:
     )
 
 
+def _interval(record: StampedRecord) -> float:
+    """Return the sampling interval of the slower signal, s, each repeated value taken once."""
+    return max(without_repeats(one).period for one in (record.drive, record.position))
+
+
 def _as_sampled(
     outcome: _Outcome,
     record: StampedRecord,
@@ -381,9 +386,8 @@ def _as_sampled(
     is no lag, the moves need no check.
     """
     by_sample = curves[0].by_sample if curves and lag.deviation is None else 0.0
-    interval = max(without_repeats(one).period for one in (record.drive, record.position))
     doubted = verdicts.doubted_by_sampling(
-        outcome.parameters, by_sample, interval, curves[0].fit if curves else 1.0
+        outcome.parameters, by_sample, _interval(record), curves[0].fit if curves else 1.0
     )
     known = outcome.numbers.get(SLIDING)
     if levels is None or (lag.is_known and known is not levels.numbers[SLIDING]):
@@ -437,9 +441,8 @@ def _as_stored(outcome: _Outcome, record: StampedRecord, valve: Valve, lag: LagP
     if math.isnan(spring):
         spring = valve.force_per_drive * np.ptp(record.drive.value) / np.ptp(record.position.value)
     banded = math.hypot(force, spring * archive_dead_band(record.position)) / math.sqrt(12.0)
-    is_slow = max(record.drive.period, record.position.period) > _SCAN
     unseen = 0.0
-    if is_slow and lag.deviation is None:
+    if _interval(record) > _SCAN and lag.deviation is None:
         unseen = _UNSEEN * abs(outcome.numbers[SLIDING].value) / NORMAL_QUANTILE
     hidden = {ARCHIVE: banded, UNSEEN: unseen}
     if not any(hidden.values()):
