@@ -252,6 +252,7 @@ def test_few_values_at_uneven_times_are_lines_and_rests(export):
     found = read(export(("FV-7.PT", time, 1.0 + stem / 200), ("FV-7.ZT", time, stem)))
     recording = found.recording()
     assert (recording.gap, recording.sample_period) == ("", 1.0)
+    assert "is held until the next; 3 long lines are kept" in str(found.notes)
     on_lines = np.interp(recording.time, time, stem) / 100 * TRAVEL
     np.testing.assert_allclose(recording.position, on_lines, atol=0.0011 * TRAVEL)
 

@@ -191,9 +191,11 @@ def _filled(reads: Sequence[ReadSignal]) -> tuple[list[ReadSignal], list[str]]:
         is_stored = _is_irregular(pauses) or held > _MANY * np.sum(length)
         found.append(_held(read, pauses, gaps) if is_stored else read)
         if is_stored:
+            lines = np.count_nonzero(pauses.is_long & ~pauses.is_usual & ~gaps)
             notes.append(
                 f"{read.signal.name!r} is compressed: each of its {read.stamps.size} stored "
                 "values is held until the next"
+                + (f"; {lines} long lines are kept" if lines else "")
             )
     return found, notes
 
