@@ -457,7 +457,7 @@ HIGH = "column 'pressure_pa': 300000 Pa is outside the sensor's range 0 to 25000
             "row 12, column 'time_s' goes back (0 s after 0.009 s): "
             "sort the rows, or use the record before or after it",
         ),
-        ([HEADER, GOOD[0]], None, "only one sample of pressure_pa: check that it is sampled cont"),
+        ([HEADER, GOOD[0]], None, "only one sample of pressure_pa: check that it is sampled, and"),
         ([HEADER], None, "cannot tell what it holds: there are no values under the header"),
     ],
     ids=["from the top", "blank rows", "empty stretch", "repeated", "back", "one", "none"],

@@ -424,7 +424,9 @@ def _period(name: str, samples: Samples) -> int:
     if samples.stamps.size == 0:
         raise LittleMotionError(f"no samples of {name}: check that it is published on this topic")
     if samples.stamps.size == 1:
-        raise LittleMotionError(f"only one sample of {name}: check that it is sampled continuously")
+        raise LittleMotionError(
+            f"only one sample of {name}: check that it is sampled, and that it changes"
+        )
     return int(np.median(np.diff(samples.stamps)))
 
 
