@@ -34,6 +34,58 @@ def numbers_in_runs(lengths: NDArray[np.intp]) -> NDArray[np.intp]:
     return np.arange(lengths.sum()) - np.repeat(np.cumsum(lengths) - lengths, lengths)
 
 
+LONG_PAUSE = 10
+"""Periods of a signal above which a pause is long: samples are missing, or it was silent.
+
+Chosen: at 100 Hz or faster such a pause is 0.1 s at most, short against a stroke."""
+
+_SCAN = 0.05
+_FEWEST_BUNCHES, _ALIKE = 10, 0.3
+_USUAL, _STEPS = 0.9, 3.0
+"""Conditions of silences.
+
+The period of the scans is the `_SCAN` quantile of the pauses. Samples are in bunches if at least
+`_FEWEST_BUNCHES` of them and their pauses are of one length, to within the share `_ALIKE`. After a
+silence the value differs by at most `_STEPS` usual steps, the `_USUAL` quantile of those between
+two neighbours."""
+
+
+class Pauses(NamedTuple):
+    """The pauses between the samples of a signal, and the period of its scans, ns."""
+
+    length: NDArray[np.int64]
+    scan: float
+    is_long: NDArray[np.bool_]
+    is_usual: NDArray[np.bool_]
+    """Whether the signal goes on with a usual step, as one that rested does."""
+    is_telling: bool
+    """Whether that means a rest: usual steps are small, and samples do not come in bunches."""
+
+    @classmethod
+    def of(cls, stamps: NDArray[np.int64], values: NDArray[np.float64]) -> "Pauses":
+        """Judge the pauses of a signal at these stamps, ns."""
+        length, steps = np.diff(stamps), np.abs(np.diff(values))
+        scan = float(np.quantile(length, _SCAN, method="lower"))
+        is_long = length > LONG_PAUSE * scan
+        most = _STEPS * float(np.quantile(steps if is_long.all() else steps[~is_long], _USUAL))
+        is_telling = 2.0 * most < float(np.ptp(values))
+        where = np.flatnonzero(is_long)
+        if where.size >= _FEWEST_BUNCHES:
+            both = length[where], np.diff(where)
+            alike = all(np.ptp(one) <= _ALIKE * np.median(one) for one in both)
+            is_telling &= not (alike and np.median(both[1]) > 1)
+        return cls(length, scan, is_long, steps <= most, is_telling)
+
+    @property
+    def silences(self) -> NDArray[np.bool_]:
+        """Which long pauses are no gaps, as the signal rested.
+
+        A source that omits what does not change is silent while its signal rests, and goes on with
+        a usual step. A source that has lost samples goes on from elsewhere.
+        """
+        return self.is_long & self.is_usual & self.is_telling
+
+
 def without_repeats(signal: StampedSignal) -> StampedSignal:
     """Keep only the fresh values of a held signal, at the stamps of their first appearance.
 

@@ -23,9 +23,12 @@ from typing import Any
 
 from valve_friction_ros.model.drive import Drive
 
+LAG_SETTING = "timing_uncertainty (--timing-uncertainty)"
+"""The setting of the lag between the signals, as a valve file, a node and a command name it."""
+
 MORE_STROKES = (
-    "record more strokes, some fast and some slow, and set timing_uncertainty if the clocks and "
-    "lags of both signals are known"
+    f"record more strokes, some fast and some slow, and state {LAG_SETTING} if the clocks and lags "
+    "of both signals are known"
 )
 """Advice for a narrower interval of friction."""
 

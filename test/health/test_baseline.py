@@ -99,8 +99,8 @@ class TestOfAResult:
         assert str(refusal.value) == (
             "this result cannot be the baseline: Coulomb friction is known to ±35 %, but a "
             "baseline requires ±33 %; sliding friction is known to ±40 %, but a baseline requires "
-            "±33 %: record more strokes, some fast and some slow, and set timing_uncertainty if "
-            "the clocks and lags of both signals are known"
+            "±33 %: record more strokes, some fast and some slow, and state timing_uncertainty "
+            "(--timing-uncertainty) if the clocks and lags of both signals are known"
         )
         lacks = tuple(
             BaselineLack(name, Lack.PRECISION, share, LARGEST_SHARE)

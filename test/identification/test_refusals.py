@@ -44,6 +44,7 @@ from valve_friction_ros.model import (
     converter_response,
     simulate,
 )
+from valve_friction_ros.model.recording import StampedRecord, StampedSignal
 from valve_friction_ros.signals import measured, position_noise
 
 SETTINGS = IdentificationSettings(assumed_mass=1.6)
@@ -177,6 +178,23 @@ def test_the_wrong_valve():
         mixed,
         r"^pressure and stem do not move together \(.* 0 % of the pressure.*to this valve",
     )
+
+
+def test_a_pressure_that_is_too_slow_for_the_moves():
+    """One value a minute, at random: as if it belonged to another valve."""
+    time = np.arange(6000) / 2.0
+    pressure = np.random.default_rng(4).uniform(6e4, 2e5, 51)
+    minutes = StampedSignal(60.0 * np.arange(51), pressure)
+    stem = StampedSignal(time, 0.014 + 0.01 * np.sin(time / 3.0))
+    record = Recording(
+        0.5,
+        np.interp(time, minutes.time, pressure),
+        stem.value,
+        stamped=StampedRecord(minutes, stem),
+    )
+    message = r"^pressure and .* it; a pressure every 60 s does not show shorter moves$"
+    with pytest.raises(RefusalError, match=message):
+        identify_plant(record, BENCH_VALVE, SETTINGS)
 
 
 def test_position_counted_the_wrong_way(healthy):

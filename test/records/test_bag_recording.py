@@ -258,7 +258,7 @@ class TestBadSamples:
         bag = write_bag(tmp_path / "bag", [messages[1], *messages[::2]])
         assert problem(bag) == (
             ", /fv_101: only one sample of /fv_101/stem_state: "
-            "check that it is sampled continuously"
+            "check that it is sampled, and that it changes"
         )
 
 

@@ -183,18 +183,18 @@ def test_a_slow_logger_that_loses_a_sixth_of_its_samples_is_not_compressed(expor
     assert "gap of" in found.recording().gap
 
 
-def test_after_a_bad_value_nothing_is_known(export):
-    pressure, stem, _ = sampled(0)
-    tags = [
-        (tag, rows := stored(values, band), values[rows])
-        for tag, values, band in (("FV-7.PT", pressure, 0.005), ("FV-7.ZT", stem, 0.3))
-    ]
-    path = export(*tags)
-    lines = path.read_text().splitlines()
-    lines[100] = ";".join([*lines[100].split(";")[:2], "I/O Timeout"])
-    path.write_text("\n".join(lines) + "\n")
-    with pytest.raises(RefusalError, match="gaps take"):
-        read(path).recording()
+def test_after_a_bad_value_nothing_is_known_until_the_next(export):
+    """A minute of silence is left out only where the tag has said that it is not read."""
+    time = np.concatenate([60.0 * minute + np.arange(5.0) for minute in range(100)])
+    stem = np.concatenate([np.linspace(10 + k % 7, 10 + (k + 1) % 7, 5) for k in range(100)])
+    path = export(("FV-7.PT", time, 1.0 + stem / 200), ("FV-7.ZT", time, stem))
+    assert read(path).recording().stamped is None
+    begin = (BEGIN + timedelta(seconds=2410.0)).isoformat()
+    path.write_text(path.read_text() + f"FV-7.ZT;{begin};I/O Timeout\n")
+    found = read(path)
+    assert "'FV-7.ZT' is compressed" in str(found.notes)
+    steps = np.diff(found.recording().stamped.position.time)
+    np.testing.assert_allclose(steps[np.abs(steps - 1.0) > 1e-6], 56.0)
 
 
 def test_bunches_are_not_compressed(export):
@@ -213,3 +213,78 @@ def test_values_that_differ_after_each_pause_are_lost(export):
     stem = np.repeat(generator.uniform(0.0, 100.0, 30), 20)
     with pytest.raises(RefusalError, match="gaps take"):
         read(export(("FV-7.PT", time, 1.0 + stem / 200), ("FV-7.ZT", time, stem))).recording()
+
+
+def test_a_stem_that_stands_still_for_hours_is_silent(export):
+    """Three strokes, stored at each change; the pressure is stored all the time, or not either."""
+    begins = np.array([0.0, 9000.0, 20_000.0])
+    time = np.concatenate([begin + np.arange(41.0) for begin in begins])
+    stem = np.tile(50.0 + 20.0 * np.sin(np.linspace(0.0, 2.0 * np.pi, 41)), 3)
+    always = np.arange(20_041.0)
+    within = np.interp(always, time, stem)
+    for stored_pressure in ((time, 1.0 + stem / 200), (always, 1.0 + within / 200)):
+        found = read(export(("FV-7.PT", *stored_pressure), ("FV-7.ZT", time, stem)))
+        recording = found.recording()
+        assert not recording.gap
+        assert (recording.sample_period, len(recording)) == (1.0, 20_041)
+        assert "'FV-7.ZT' is compressed: each of its 123 stored values" in str(found.notes)
+        np.testing.assert_allclose(recording.position, within / 100 * TRAVEL, atol=3e-8)
+
+
+def test_a_jump_after_a_rest_is_a_gap_unless_the_other_signal_was_there(export):
+    """A stem that is scanned each 5 s jumps by a third of its range from rest to rest."""
+    generator = np.random.default_rng(8)
+    begins = np.cumsum(generator.uniform(600.0, 2000.0, 10)).round()
+    time = np.concatenate([begin + np.arange(0.0, 100.0, 5.0) for begin in begins])
+    stem = np.repeat(10.0 + 30.0 * (np.arange(10) % 3), 20)
+    with pytest.raises(RefusalError, match="gap of"):
+        read(export(("FV-7.PT", time, 1.0 + stem / 200), ("FV-7.ZT", time, stem))).recording()
+    always = np.arange(begins[0], time[-1] + 1.0)
+    held = stem[np.searchsorted(time, always, side="right") - 1]
+    recording = read(export(("FV-7.PT", always, 1.0 + held / 200), ("FV-7.ZT", time, stem)))
+    assert not recording.recording().gap
+
+
+def test_few_values_at_uneven_times_are_lines_and_rests(export):
+    """As a swinging door stores them: both ends of each ramp and of each rest."""
+    time = np.array([0, 1, 300, 301, 1500, 1800, 1801, 2500, 2501, 3400, 3700, 5000])
+    stem = np.array([20, 20, 60, 60, 60.1, 30, 30, 30.1, 30, 30, 70, 70.0])
+    found = read(export(("FV-7.PT", time, 1.0 + stem / 200), ("FV-7.ZT", time, stem)))
+    recording = found.recording()
+    assert (recording.gap, recording.sample_period) == ("", 1.0)
+    assert "is held until the next; 3 long lines are kept" in str(found.notes)
+    on_lines = np.interp(recording.time, time, stem) / 100 * TRAVEL
+    np.testing.assert_allclose(recording.position, on_lines, atol=0.0011 * TRAVEL)
+
+
+def test_forced_values_of_a_still_stem_are_not_its_scans(export):
+    """A value is stored each ten minutes in any case; the moves between are stored each 10 s."""
+    begins = 600.0 * np.arange(1, 40)
+    moves = [begin + 10.0 * np.arange(1, 5) for begin in begins[::6]]
+    time = np.sort(np.concatenate([begins, *moves]))
+    stem = 40.0 + 20.0 * np.interp(time, np.ravel(moves), np.arange(28.0) // 4 % 2)
+    recording = read(export(("FV-7.PT", time, 1.0 + stem / 200), ("FV-7.ZT", time, stem)))
+    assert recording.recording().sample_period == 10.0
+
+
+def test_jittering_stamps_of_a_logger_are_not_compressed(export):
+    """By a third of the period; some samples come nearly together."""
+    generator = np.random.default_rng(9)
+    time = np.sort(np.arange(2000) + 0.33 * generator.standard_normal(2000))
+    stem = 50.0 + 40.0 * np.sin(time / 100.0)
+    found = read(export(("FV-7.PT", time, 1.0 + stem / 200), ("FV-7.ZT", time, stem)))
+    assert "is compressed" not in str(found.notes)
+
+
+def test_repeated_values_are_scanned_as_slowly_as_they_change(export, monkeypatch):
+    """An export five times a second of values read once a second hides as much between them."""
+    pressure, stem, _ = sampled(0)
+    begin = slice(0, 2400)
+    rows = np.arange(0.0, 2400.0, 0.2)
+    tags = (("FV-7.PT", pressure[begin]), ("FV-7.ZT", stem[begin]))
+    recording = read(export(*((tag, rows, np.repeat(y, 5)) for tag, y in tags))).recording()
+    found = identify_plant(recording, BENCH_VALVE).parameters["sliding_friction"]
+    monkeypatch.setattr(method, "_UNSEEN", 0.0)
+    plain = identify_plant(recording, BENCH_VALVE).parameters["sliding_friction"]
+    added = np.sqrt(found.half_width**2 - plain.half_width**2)
+    assert added == pytest.approx(0.04 * found.value, rel=1e-6)

@@ -266,6 +266,13 @@ class TestStretch:
 class TestColumns:
     """What is missing or ambiguous is asked for at once, each with its option."""
 
+    def test_the_file_of_the_other_signal_is_asked_for(self, write):
+        message = refused(write(["time_s,pressure_pa", *rows(TIME, PRESSURE)]))
+        assert message.startswith(
+            "cannot tell which column is the position, of time_s, pressure_pa (--position-column); "
+            "if another file holds it, give both files"
+        )
+
     @pytest.mark.parametrize(
         ("header", "asked"),
         [
@@ -450,7 +457,7 @@ HIGH = "column 'pressure_pa': 300000 Pa is outside the sensor's range 0 to 25000
             "row 12, column 'time_s' goes back (0 s after 0.009 s): "
             "sort the rows, or use the record before or after it",
         ),
-        ([HEADER, GOOD[0]], None, "only one sample of pressure_pa: check that it is sampled cont"),
+        ([HEADER, GOOD[0]], None, "only one sample of pressure_pa: check that it is sampled, and"),
         ([HEADER], None, "cannot tell what it holds: there are no values under the header"),
     ],
     ids=["from the top", "blank rows", "empty stretch", "repeated", "back", "one", "none"],
@@ -463,12 +470,12 @@ class TestTimes:
     def test_gap(self, write):
         """From row 12 on, the samples come 20 ms later: 21 periods without one."""
         late = TIME + 0.02 * (np.arange(40) >= 10)
-        record = read_csv(write([HEADER, *rows(late, POSITION, PRESSURE)]))
+        record = read_csv(write([HEADER, *rows(late, 0.1 * late, 1e6 * late)]))
         assert record.gap == (
             "row 12, column 'time_s': gap of 0.021 s: use a stretch without it (--begin, --end)"
         )
         assert len(record) == 60
-        np.testing.assert_array_equal(record.stamped.position.value, POSITION)
+        np.testing.assert_array_equal(record.stamped.position.value, 0.1 * late)
 
     def test_ten_periods_are_no_gap_and_more_than_the_samples_is_a_refusal(self, write):
         late = TIME + 0.009 * (np.arange(40) >= 10)
@@ -476,7 +483,7 @@ class TestTimes:
         assert (len(record), record.gap) == (49, "")
         late = TIME + 0.04 * (np.arange(40) >= 10)
         with pytest.raises(RefusalError, match=r"row 12, column 'time_s': gap of 0.041 s: use a "):
-            read_csv(write([HEADER, *rows(late, POSITION, PRESSURE)]))
+            read_csv(write([HEADER, *rows(late, 0.1 * late, 1e6 * late)]))
 
     @pytest.mark.parametrize("form", ["%d.%m.%Y", "%m/%d/%Y", "%d-%m-%Y", "%Y-%m-%d"])
     @pytest.mark.parametrize("mark", [".", ","])

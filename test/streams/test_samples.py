@@ -443,7 +443,10 @@ class TestTooLittle:
     def test_nothing_and_one(self, missing, name):
         for count, message in (
             (0, f"no samples of {name}: check that it is published on this topic"),
-            (1, f"only one sample of {name}: check that it is sampled continuously"),
+            (
+                1,
+                f"only one sample of {name}: check that it is sampled, and that it changes",
+            ),
         ):
             signals = [signal(every(1, 30), pressure), signal(every(1, 30), position)]
             signals[missing] = Samples(*(column[:count] for column in signals[missing]))

@@ -28,17 +28,17 @@ from valve_friction_ros.commands.arguments.recording import (
 )
 from valve_friction_ros.commands.console import plain_console
 from valve_friction_ros.commands.process import ExitCode, complain
+from valve_friction_ros.held_signals import LONG_PAUSE
 from valve_friction_ros.identification.rendering import plain
 from valve_friction_ros.outside_text import printable
 from valve_friction_ros.records.bags.topics import is_bag
 from valve_friction_ros.records.layout import Layout
 from valve_friction_ros.records.table import OpenTables, ReadSignal
 from valve_friction_ros.streams import utc_second
+from valve_friction_ros.wording import lasting
 
 _DATED = 946_684_800_000_000_000
 """Time, ns since 1970, from which a stamp is taken for a date: the year 2000."""
-_GAP = 10
-"""Number of sampling periods beyond which a pause is a gap."""
 _BARS = "▁▂▃▄▅▆▇█"
 _PARTS = 60
 """Largest number of intervals in the sketch of a signal."""
@@ -58,7 +58,7 @@ def _inspected(valve: str, read: ReadSignal) -> dict[str, Any]:
         "period": period,
         "low": float(np.min(read.values, initial=np.inf)),
         "high": float(np.max(read.values, initial=-np.inf)),
-        "gaps": int((steps > _GAP * period).sum()),
+        "gaps": int((steps > LONG_PAUSE * period).sum()),
         "longest": float(np.max(steps, initial=0.0)),
         "begin": int(read.stamps[0]) if read.stamps.size else 0,
     }
@@ -73,7 +73,7 @@ def _cells(one: Mapping[str, Any]) -> tuple[str, ...]:
         str(one["samples"]),
         f"{one['period']:.4g} s" if one["samples"] > 1 else "–",
         f"{one['low']:.6g} … {one['high']:.6g}" if one["samples"] else "–",
-        f"{one['gaps']}, longest {one['longest']:.3g} s" if one["gaps"] else "none",
+        f"{one['gaps']}, up to {lasting(one['longest'])}" if one["gaps"] else "none",
         str(one["bad"]),
     )
 
@@ -101,7 +101,17 @@ def _print(layout: Layout, reads: list[ReadSignal], signals: list[dict[str, Any]
         if name not in {one["name"] for one in signals}
     ]
     if signals:
-        heads = ("valve", "signal", "column", "unit", "values", "every", "range", "gaps", "bad")
+        heads = (
+            "valve",
+            "signal",
+            "column",
+            "unit",
+            "values",
+            "every",
+            "range",
+            "long pauses",
+            "bad",
+        )
         rows = [_cells(one) for one in signals]
         kept = [place for place in range(len(heads)) if any(row[place] for row in rows)]
         table = Table(*(heads[place] for place in kept), box=None, header_style="bold")

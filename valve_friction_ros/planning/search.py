@@ -42,7 +42,7 @@ from valve_friction_ros.planning.stroke_test import (
     stroke_test,
     strokes,
 )
-from valve_friction_ros.wording import percentage
+from valve_friction_ros.wording import LAG_SETTING, percentage
 
 _MOST_SAMPLES = 12_000
 """Most samples that a forecast simulates: fewer samples with less noise give the same intervals."""
@@ -454,8 +454,8 @@ def _unknown_parameters(plan: StrokePlan) -> Iterator[str]:
         remedy = "allow more time, speed or travel"
         if name == "viscous_friction":
             remedy = (
-                "its delay F_v/k cannot be distinguished from a lag of the signals: set a smaller "
-                "timing_uncertainty if the clocks allow it"
+                "its delay F_v/k cannot be distinguished from a lag of the signals: state a "
+                f"smaller {LAG_SETTING} if the clocks allow it"
             )
         yield f"{name} {why}: {remedy}"
     packing = plan.likely.parameters

@@ -316,6 +316,8 @@ class _Recognition(Look):
         what = "tag" if is_tag else "column"
         what = f"which {what} is the {quantity}" + ("" if among else f", of {self.names}")
         unit = "" if has_unit else f", and its unit (--{quantity}-unit)"
+        if not among and quantity in ("pressure", "force", "position"):
+            unit = "; if another file holds it, give both files (identify-folder: with --plant)"
         self.questions.append(f"{what} (--{quantity}-column{listed}){unit}")
         self.asked.add(quantity)
 

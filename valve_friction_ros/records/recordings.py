@@ -12,16 +12,15 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from itertools import compress
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from valve_friction_ros.held_signals import numbers_in_runs
+from valve_friction_ros.held_signals import LONG_PAUSE, Pauses, numbers_in_runs
 from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.model.drive import Drive
-from valve_friction_ros.model.recording import Recording
+from valve_friction_ros.model.recording import Recording, StampedSignal
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.records.bags.topics import TopicChoice, bag_libraries, is_bag
 from valve_friction_ros.records.columns import Columns
@@ -138,51 +137,67 @@ def _drive(
     return drive, Drive.PRESSURE
 
 
-_SCAN, _LONG = 0.1, 10.0
-_FEWEST_PAUSES, _MOST_TIME, _LEAST_TIME = 10, 0.5, 0.1
-_AS_BEFORE, _CHANGE, _ALIKE = 0.8, 0.1, 1.3
+_MANY = 0.1
 _MOST_HELD = 300_000
-"""Conditions of compressed signals.
-
-Pauses of more than `_LONG` scans, whose period is the `_SCAN` quantile of all pauses, take more
-than `_MOST_TIME` of a signal, and of the other at least `_LEAST_TIME`: samples may be lost in less.
-After the share `_AS_BEFORE` of them the value has changed by at most `_CHANGE` of its range. Pauses
-and the samples between them are not all of one length, within the factor `_ALIKE`. About
-`_MOST_HELD` values are held at most, some 10 MB."""
+"""Share of the pauses, or of the time in pauses, that is long in a signal stored on change; and the
+values that are held at most, about: some 10 MB."""
 
 
-def _scan(pauses: NDArray[np.int64]) -> float:
-    """Return the period of the scans of a signal, ns, by the pauses between its values."""
-    return float(np.quantile(pauses, _SCAN)) if pauses.size else 0.0
+def _is_irregular(pauses: Pauses) -> bool:
+    """Return whether no clock has sampled a signal: a historian stored it on change."""
+    return bool(np.quantile(pauses.length, 1.0 - _MANY) >= LONG_PAUSE * pauses.scan)
 
 
-def _compression(read: ReadSignal) -> float:
-    """Return the share of its time in which a compressed signal has no values; 0 for any other.
+def _held(read: ReadSignal, pauses: Pauses, gaps: NDArray[np.bool_]) -> ReadSignal:
+    """Repeat each stored value of a signal, scan by scan, up to the next, outside gaps.
 
-    After a bad value nothing is known. Samples in bunches of one length, with pauses of one length,
-    are not compressed: a gateway has stamped them on arrival.
+    A value after a long pause that is no usual step away was stored as the end of a line.
     """
-    pauses = np.diff(read.stamps)
-    scan = _scan(pauses)
-    long = np.flatnonzero(pauses > _LONG * scan)
-    if long.size < _FEWEST_PAUSES or scan <= 0.0 or read.bad:
-        return 0.0
-    is_as_before = np.abs(np.diff(read.values))[long] <= _CHANGE * np.ptp(read.values)
-    regular = (np.max(one) <= _ALIKE * np.median(one) for one in (pauses[long], np.diff(long)))
-    if np.mean(is_as_before) < _AS_BEFORE or all(regular):
-        return 0.0
-    return float(np.sum(pauses[long]) / np.sum(pauses))
-
-
-def _held(read: ReadSignal) -> ReadSignal:
-    """Repeat each stored value of a compressed signal, scan by scan, up to the next."""
-    pauses = np.diff(read.stamps)
-    step = max(_scan(pauses), float(np.sum(pauses)) / _MOST_HELD)
-    times = np.append(np.maximum(np.rint(pauses / step).astype(np.intp), 1), 1)
+    length = pauses.length
+    step = max(pauses.scan, float(np.sum(length[~gaps])) / _MOST_HELD)
+    times = np.maximum(np.rint(length / step).astype(np.intp), 1)
+    times = np.append(np.where(gaps, 1, times), 1)
     which = np.repeat(np.arange(times.size), times)
-    after = numbers_in_runs(times) / times[which] * np.append(pauses, 0)[which]
+    after = numbers_in_runs(times) / times[which]
+    moves = np.where(pauses.is_long & ~pauses.is_usual, np.diff(read.values), 0.0)
     held = read.where(which)
-    return replace(held, stamps=held.stamps + after.astype(np.int64))
+    return replace(
+        held,
+        stamps=held.stamps + (after * np.append(length, 0)[which]).astype(np.int64),
+        values=held.values + after * np.append(moves, 0.0)[which],
+    )
+
+
+def _filled(reads: Sequence[ReadSignal]) -> tuple[list[ReadSignal], list[str]]:
+    """Hold the values of signals that are stored on change, and name these.
+
+    They have many long pauses, as no clock makes them, or rest in a share of their time.
+    A pause is a gap if all signals have lost most of it, as a historian that is off loses all; and
+    after a bad value, as nothing is known then.
+    """
+    if min(each.stamps.size for each in reads) < StampedSignal.FEWEST:
+        return [*reads], []
+    judged = [Pauses.of(each.stamps, each.values) for each in reads]
+    lost = [one.is_long & ~one.silences & (not _is_irregular(one)) for one in judged]
+    found, notes = [], []
+    for read, pauses, own in zip(reads, judged, lost, strict=True):
+        gaps, length = own.copy(), pauses.length
+        for other, its, gone in zip(reads, judged, lost, strict=True):
+            until = np.append(0, np.cumsum(np.where(gone, its.length, 0)))
+            gaps &= 2.0 * np.diff(np.interp(read.stamps, other.stamps, until)) > length
+        after_bad = np.searchsorted(read.stamps, read.bad_at)
+        gaps |= pauses.is_long & np.isin(np.arange(1, read.stamps.size), after_bad)
+        held = float(np.sum(length[pauses.is_long & ~gaps]))
+        is_stored = _is_irregular(pauses) or held > _MANY * np.sum(length)
+        found.append(_held(read, pauses, gaps) if is_stored else read)
+        if is_stored:
+            lines = np.count_nonzero(pauses.is_long & ~pauses.is_usual & ~gaps)
+            notes.append(
+                f"{read.signal.name!r} is compressed: each of its {read.stamps.size} stored "
+                "values is held until the next"
+                + (f"; {lines} long lines are kept" if lines else "")
+            )
+    return found, notes
 
 
 def _recorded(
@@ -196,18 +211,8 @@ def _recorded(
         raise ValueError(table.asked(doubts))
     notes = [] if table.layout.is_own else [table.layout.words]
     notes += [told for each in reads for told in (left_out(each), jumps_to_zero(each)) if told]
-    shares = [_compression(each) for each in reads]
-    if max(shares) > _MOST_TIME:
-        compressed = [share > _LEAST_TIME for share in shares]
-        notes += [
-            f"{each.signal.name!r} is compressed: each of its {each.stamps.size} stored values is "
-            "held until the next"
-            for each in compress(reads, compressed)
-        ]
-        reads = [
-            _held(each) if is_held else each
-            for each, is_held in zip(reads, compressed, strict=True)
-        ]
+    reads, told = _filled(reads)
+    notes += told
     drives = [each for each in reads if each.signal.quantity != "position"]
     (stem,) = (each for each in reads if each.signal.quantity == "position")
     drive, driven_by = _drive(drives, valve, form)

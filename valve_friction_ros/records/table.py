@@ -67,6 +67,8 @@ class ReadSignal:
     """Number of omitted entries by kind."""
     example: tuple[int, str, str] = (0, "", "")
     """Row, column and text of the first bad value."""
+    bad_at: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
+    """Times of the bad values, ns."""
 
     def where(self, kept: NDArray[np.bool_] | slice) -> "ReadSignal":
         """Return the selected samples."""
@@ -100,8 +102,11 @@ class _Parts:
         blocks, self.blocks = self.blocks, []
         stamps = np.concatenate([np.empty(0, np.int64), *(one.stamps for one in blocks)])
         values = np.concatenate([np.empty(0), *(one.values for one in blocks)])
-        rows = np.concatenate([np.empty(0, np.int64), *(one.rows for one in blocks)])
-        found = ReadSignal(self.signal, stamps, values, rows, self.bad, self.example)
+        rows, bad_at = (
+            np.concatenate([np.empty(0, np.int64), *parts])
+            for parts in ((one.rows for one in blocks), (one.bad_at for one in blocks))
+        )
+        found = ReadSignal(self.signal, stamps, values, rows, self.bad, self.example, bad_at)
         if stamps.size and math.isfinite(last):
             return found.where(stamps >= stamps[-1] - last * 1e9)
         return found
@@ -212,7 +217,9 @@ class _Reader:
         timeless = good & (stamps == NO_TIME)
         self._count(part, rows, block[signal.time[-1]], timeless)
         good &= ~timeless
-        part.blocks.append(ReadSignal(signal, stamps[good], values[good], rows[good]))
+        bad_at = stamps[there & ~good & (stamps != NO_TIME)]
+        kept = ReadSignal(signal, stamps[good], values[good], rows[good], bad_at=bad_at)
+        part.blocks.append(kept)
         self._in_order(part.blocks[-1])
 
     def _there(

@@ -19,6 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from valve_friction_ros.held_signals import LONG_PAUSE, Pauses
 from valve_friction_ros.identification.refusal import LittleMotionError, RefusalError
 from valve_friction_ros.model.drive import Drive
 from valve_friction_ros.model.recording import Recording, StampedRecord, StampedSignal
@@ -330,11 +331,6 @@ def _stamps(seconds: NDArray[np.float64]) -> NDArray[np.int64]:
     return stamps
 
 
-_LARGEST_GAP = 10
-"""Sampling periods above which a pause is a gap; shorter pauses are interpolated.
-
-Chosen: at 100 Hz or faster such a pause is 0.1 s at most, short against a stroke."""
-
 _FEWEST_BUNCHES = 10
 """Least gaps of about one length between stamps in bunches. Chosen: outages differ in length."""
 
@@ -343,19 +339,8 @@ _MOST_MISSING = 0.5
 
 More than half of the grid would be interpolated, and the noise, a median, would be zero."""
 
-_LOW, _APART = 0.2, 0.3
-_FEWEST_CHANGES = 30
-_HEARTBEAT, _BAND = 0.5, 3.0
 _LONGEST_SILENCE = 600_000_000_000
-"""Limits by which a signal is found to be sent on change, and by which its pauses are silences.
-
-A signal is sent on change if no change is below the share `_APART` of their `_LOW` quantile.
-Changes after more than the share `_HEARTBEAT` of the longest pause do not enter, since they may be
-signs of life. A pause is a silence if the value then differs by at most `_BAND` low quantiles, and
-if it lasts at most ten minutes, ns.
-
-In a signal sampled by a clock, 6 % of the changes are that small. By chance none is among
-`_FEWEST_CHANGES` in 16 % of the records, and among a hundred in 0.2 %; both have no pauses."""
+"""Longest pause, ns, in which a sensor that sends only on change may be silent: ten minutes."""
 
 _ON_GRID = 1e-3
 """Distance of a stamp from the grid, as a share of its period, up to which the stamp is on it.
@@ -413,31 +398,15 @@ class Gap:
         return f"{self.what}: {self.remedy(usual)}"
 
 
-def _silences(samples: Samples) -> NDArray[np.bool_]:
-    """Return which pauses are not gaps but silences of a sensor that sends only on change.
-
-    Such a sensor sends a value that differs from its last by a dead band, and is silent while its
-    signal rests.
-    """
-    pauses = np.diff(samples.stamps)
-    changes = np.abs(np.diff(samples.values))
-    usual = changes[pauses < _HEARTBEAT * pauses.max()]
-    if usual.size < _FEWEST_CHANGES:
-        return np.zeros(pauses.size, dtype=np.bool_)
-    low = float(np.quantile(usual, _LOW))
-    if not (low > 0 and np.min(usual) >= _APART * low):
-        return np.zeros(pauses.size, dtype=np.bool_)
-    return np.asarray((changes <= _BAND * low) & (pauses <= _LONGEST_SILENCE))
-
-
 def _gap(name: str, samples: Samples, period: int) -> Gap | None:
-    pauses = np.where(_silences(samples), 0, np.diff(samples.stamps))
+    pauses = np.diff(samples.stamps)
+    pauses[Pauses.of(*samples).silences & (pauses <= _LONGEST_SILENCE)] = 0
     longest = int(np.argmax(pauses))
-    if pauses[longest] <= _LARGEST_GAP * period:
+    if pauses[longest] <= LONG_PAUSE * period:
         return None
     since_start = float(samples.stamps[longest] - samples.stamps[0]) / 1e9
     whole = float(samples.stamps[-1] - samples.stamps[0])
-    gaps = pauses[pauses > _LARGEST_GAP * period]
+    gaps = pauses[pauses > LONG_PAUSE * period]
     is_regular = gaps.size >= _FEWEST_BUNCHES and 2 * np.median(gaps) > gaps.max()
     return Gap(
         name,
@@ -455,7 +424,9 @@ def _period(name: str, samples: Samples) -> int:
     if samples.stamps.size == 0:
         raise LittleMotionError(f"no samples of {name}: check that it is published on this topic")
     if samples.stamps.size == 1:
-        raise LittleMotionError(f"only one sample of {name}: check that it is sampled continuously")
+        raise LittleMotionError(
+            f"only one sample of {name}: check that it is sampled, and that it changes"
+        )
     return int(np.median(np.diff(samples.stamps)))
 
 

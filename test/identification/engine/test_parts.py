@@ -20,7 +20,15 @@ from valve_friction_ros.identification import identify
 from valve_friction_ros.identification.engine.broad_model import ABSENT, SWINGING, BroadModel
 from valve_friction_ros.identification.engine.coordinates import TIMING, Profile
 from valve_friction_ros.identification.engine.fitted_record import fitted_record, inflation
-from valve_friction_ros.identification.engine.intervals import Estimated
+from valve_friction_ros.identification.engine.intervals import (
+    ARCHIVE,
+    AT_REST,
+    AVERAGES,
+    ROUNDING,
+    STROKES,
+    UNSEEN,
+    Estimated,
+)
 from valve_friction_ros.identification.engine.lags import (
     LagPrior,
     LagProfile,
@@ -359,8 +367,9 @@ def test_lags_that_compensate_each_other_are_not_named(clock, pressure, said):
 
 
 def test_every_source_has_words():
-    """Also the place of the stem at first, which is no imperfection of a plant."""
-    for name in (*ABSENT, "start_position"):
+    """Also those that are no imperfection of a plant."""
+    of_record = (ROUNDING, ARCHIVE, UNSEEN, STROKES, AVERAGES, AT_REST)
+    for name in (*ABSENT, "start_position", *of_record):
         doubt = main_doubt(Estimated(1.0, 0.2, 1.0, 0.0, {name: 2.0}), interval_share(1.0, 0.2))
         assert doubt.startswith(
             "its interval is ±20 % of its value; not determined by the record: "
@@ -368,6 +377,7 @@ def test_every_source_has_words():
     assert main_doubt(Estimated(1.0, 0.2, 1.0, 0.0, {"drift": 0.1}), "").endswith(
         "motion that the model does not explain"
     )
+    assert main_doubt(Estimated(1.0, 0.2, 1.0, 2.0), "").endswith(": lag between the signals")
 
 
 def ended(misfit, penalty, inflation, low_speed=(0.0, 1.0)):
@@ -483,6 +493,20 @@ def test_of_too_much_motion_the_longest_way_is_taken():
     inside = part.record.position.time
     assert inside[0] > 3900
     assert inside[-1] < 6100
+
+
+@pytest.mark.parametrize("seed", [11, 23, 60])
+def test_a_few_positions_in_hours_are_kept(seed):
+    """As of a stem that was sent on change: no window of it moves."""
+    generator = np.random.default_rng(seed)
+    count = generator.integers(8, 30)
+    time = np.sort(generator.uniform(0, 14_000, count))
+    place = np.where(np.arange(count) == count // 2, 0.01, 0.0)
+    stem = StampedSignal(time, place + 1e-6 * generator.standard_normal(count))
+    seconds = np.arange(14_000.0)
+    drive = StampedSignal(seconds, np.sin(seconds / 900.0))
+    part = moving_part(StampedRecord(drive, stem, Drive.PRESSURE))
+    assert part.record.position.time.size >= StampedSignal.FEWEST
 
 
 def test_a_creeping_stem_does_not_rest():

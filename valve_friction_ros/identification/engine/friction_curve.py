@@ -34,8 +34,11 @@ from valve_friction_ros.identification.engine.balance_posterior import Posterior
 from valve_friction_ros.identification.engine.balance_regression import Regression
 from valve_friction_ros.identification.engine.coordinates import sensor_span, zero_drift
 from valve_friction_ros.identification.engine.intervals import (
+    AVERAGES,
     RECTANGLE,
     ROUNDING,
+    STROKES,
+    UNSEEN,
     Estimated,
 )
 from valve_friction_ros.identification.engine.lags import LagPrior, LagProfile
@@ -316,14 +319,15 @@ def _by_strokes(
     distance = float(np.sum(np.abs(way)))
     along = moves / distance
     rounding = work_of_rounding(force, grid, along)
-    of_record = math.hypot(
-        half_width(math.sqrt(float(covariance[0, 0])), freedom),
-        NORMAL_QUANTILE * math.hypot(rounding, _unseen_between(pressed, position, way)),
-    )
-    record, timing = of_record / NORMAL_QUANTILE, of_lag / NORMAL_QUANTILE
-    sources = {ROUNDING: rounding} if rounding > 0.0 else {}
+    scatter_of_strokes = half_width(math.sqrt(float(covariance[0, 0])), freedom) / NORMAL_QUANTILE
+    sources = {
+        ROUNDING: rounding,
+        UNSEEN: _unseen_between(pressed, position, way),
+        STROKES: scatter_of_strokes,
+    }
+    record, timing = math.hypot(*sources.values()), of_lag / NORMAL_QUANTILE
     squares = np.add.reduceat(np.gradient(halves[0]) * np.gradient(halves[1]), turns[:-1])
-    width = math.hypot(of_record, of_lag)
+    width = math.hypot(NORMAL_QUANTILE * record, of_lag)
     sliding = Estimated(value, width, record, timing, sources, timing)
     return FrictionCurve(
         step,
@@ -413,12 +417,12 @@ def curve_numbers(curves: Sequence[FrictionCurve]) -> dict[str, Estimated]:
         least_width = min(one.half_width for one in known)
         best = next(one for one in known if one.half_width <= _AS_WELL * least_width)
         near = [one.value for one in known if one.half_width < _NEARLY * best.half_width]
-        half_width = math.hypot(
-            best.half_width,
-            _SCATTERS * float(np.std(near)),
-            least * best.value,
+        beside = math.hypot(_SCATTERS * float(np.std(near)), least * best.value)
+        result[name] = replace(
+            best,
+            half_width=math.hypot(best.half_width, beside),
+            sources={**best.sources, AVERAGES: beside / NORMAL_QUANTILE},
         )
-        result[name] = replace(best, half_width=half_width)
     return result
 
 

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from valve_friction_ros.held_signals import SLOW_SAMPLING
 from valve_friction_ros.identification.engine.departures import by_least_magnitudes
 from valve_friction_ros.identification.engine.friction_curve import FrictionCurve
-from valve_friction_ros.identification.engine.intervals import Estimated
+from valve_friction_ros.identification.engine.intervals import AT_REST, Estimated
 from valve_friction_ros.identification.engine.sliding_averages import (
     MeasuredSignal,
     away_from_stops,
@@ -186,7 +186,9 @@ def _curve(levels: _Levels, step: float) -> FrictionCurve | None:
     of_levels = half_width(scatter * math.sqrt(float(inverse[0, 0])), freedom)
     hidden = _HIDDEN * math.hypot(levels.force, float(slope) * levels.stem)
     of_record = math.hypot(of_levels, hidden)
-    width = math.hypot(of_record, _AT_REST * abs(float(friction)))
+    at_rest = _AT_REST * abs(float(friction))
+    width = math.hypot(of_record, at_rest)
+    sources = {AT_REST: at_rest / NORMAL_QUANTILE}
     of_slope = scatter * math.sqrt(float(inverse[1, 1]))
     if slope <= _CLEARLY * of_slope or not width <= _LARGEST_HALF_WIDTH * friction:
         return None
@@ -195,7 +197,7 @@ def _curve(levels: _Levels, step: float) -> FrictionCurve | None:
         side * speed,
         side * float(friction) + left,
         np.full_like(left, scatter),
-        {SLIDING: Estimated(float(friction), width, of_record / NORMAL_QUANTILE, 0.0)},
+        {SLIDING: Estimated(float(friction), width, of_record / NORMAL_QUANTILE, sources=sources)},
         sliding_speed=float(np.mean(speed)),
         stribeck_velocity=0.0,
         lag=0.0,

@@ -178,7 +178,7 @@ def _identified(
         departed = static_friction(record, valve, balanced, lag)
     static = math.nan if departed is None else departed.static_friction.value
     try:
-        excitation.require_related_signals(uniform)
+        excitation.require_related_signals(recording)
         outcome = _of_simulation(record, valve, settings, profile, curves, balanced, static)
     except RefusalError as refusal:
         if not _dissipates(balanced):
@@ -304,7 +304,8 @@ def _of_simulation(
             f"no friction model reproduces the record (fit {100 * misfit.fit:.0f} %, "
             f"{misfit.systematic * 1e3:.2g} mm misfit): check that both signals belong to this "
             "valve, their units and the travel; if the packing or the pressure of the process "
-            "changed, or most moves are faster than the samples, use another stretch"
+            "changed, use another stretch; if most moves are faster than the samples, "
+            f"{lasting(max(record.drive.period, record.position.period))} apart, sample faster"
         )
     if profile.has_imperfections:
         follows = not verdicts.split_doubt(fits, misfit, profile, prior.lag.reach)
@@ -365,6 +366,11 @@ def _with_departures(outcome: _Outcome, departed: Departed | None) -> _Outcome:
     )
 
 
+def _interval(record: StampedRecord) -> float:
+    """Return the sampling interval of the slower signal, s, each repeated value taken once."""
+    return max(without_repeats(one).period for one in (record.drive, record.position))
+
+
 def _as_sampled(
     outcome: _Outcome,
     record: StampedRecord,
@@ -380,9 +386,8 @@ def _as_sampled(
     is no lag, the moves need no check.
     """
     by_sample = curves[0].by_sample if curves and lag.deviation is None else 0.0
-    interval = max(without_repeats(one).period for one in (record.drive, record.position))
     doubted = verdicts.doubted_by_sampling(
-        outcome.parameters, by_sample, interval, curves[0].fit if curves else 1.0
+        outcome.parameters, by_sample, _interval(record), curves[0].fit if curves else 1.0
     )
     known = outcome.numbers.get(SLIDING)
     if levels is None or (lag.is_known and known is not levels.numbers[SLIDING]):
@@ -436,12 +441,11 @@ def _as_stored(outcome: _Outcome, record: StampedRecord, valve: Valve, lag: LagP
     if math.isnan(spring):
         spring = valve.force_per_drive * np.ptp(record.drive.value) / np.ptp(record.position.value)
     banded = math.hypot(force, spring * archive_dead_band(record.position)) / math.sqrt(12.0)
-    is_slow = max(record.drive.period, record.position.period) > _SCAN
     unseen = 0.0
-    if is_slow and lag.deviation is None:
+    if _interval(record) > _SCAN and lag.deviation is None:
         unseen = _UNSEEN * abs(outcome.numbers[SLIDING].value) / NORMAL_QUANTILE
-    hidden = {name: one for name, one in ((ARCHIVE, banded), (UNSEEN, unseen)) if one > 0.0}
-    if not hidden:
+    hidden = {ARCHIVE: banded, UNSEEN: unseen}
+    if not any(hidden.values()):
         return outcome
     total = math.hypot(*hidden.values())
     parameters, numbers = dict(outcome.parameters), dict(outcome.numbers)
@@ -453,7 +457,10 @@ def _as_stored(outcome: _Outcome, record: StampedRecord, valve: Valve, lag: LagP
             one,
             half_width=math.hypot(one.half_width, NORMAL_QUANTILE * total),
             record=math.hypot(one.record, total),
-            sources={**one.sources, **hidden},
+            sources={
+                **one.sources,
+                **{name: math.hypot(one.sources.get(name, 0.0), d) for name, d in hidden.items()},
+            },
         )
         if math.isfinite(known.value):
             width = math.hypot(known.half_width, NORMAL_QUANTILE * total)
@@ -650,7 +657,7 @@ def expected_half_widths(
     """
     settings = settings or IdentificationSettings()
     require_moving_stem(measured(recording), valve, settings)
-    excitation.require_related_signals(measured(recording))
+    excitation.require_related_signals(recording)
     truth = {
         "coulomb_friction": parameters.coulomb_friction,
         "viscous_friction": parameters.viscous_friction,

@@ -186,7 +186,7 @@ class _Windows(NamedTuple):
 def _without(
     record: StampedRecord, rests: Sequence[tuple[float, float]]
 ) -> tuple[StampedRecord, tuple[Pause, ...]]:
-    """Return a record without rests, and the pauses in their places."""
+    """Return a record without rests, and the pauses in their places, if samples remain."""
     if not rests:
         return record, ()
     begins, ends = np.array(rests).T
@@ -196,6 +196,8 @@ def _without(
         passed = np.searchsorted(ends, signal.time, side="right")
         inside = np.searchsorted(begins, signal.time, side="right") > passed
         time = (signal.time - removed[passed])[~inside]
+        if time.size < StampedSignal.FEWEST:
+            return record, ()
         signals.append(StampedSignal(time, signal.value[~inside]))
     pauses = tuple(
         Pause(float(begin - before), float(after - before))

@@ -21,9 +21,12 @@ from valve_friction_ros.identification.engine.coordinates import IMPERFECTIONS, 
 from valve_friction_ros.identification.engine.friction_curve import FrictionCurve
 from valve_friction_ros.identification.engine.intervals import (
     ARCHIVE,
+    AT_REST,
+    AVERAGES,
     NOISE_LIKE,
     NOT_QUITE,
     ROUNDING,
+    STROKES,
     UNSEEN,
     Estimated,
 )
@@ -47,7 +50,7 @@ from valve_friction_ros.identification.trust.verdict import (
 )
 from valve_friction_ros.model.recording import Recording, StampedRecord, StampedSignal
 from valve_friction_ros.signals import quantisation_step, stamped_noise
-from valve_friction_ros.wording import lasting, percentage, three_digits, two_digits
+from valve_friction_ros.wording import LAG_SETTING, lasting, percentage, three_digits, two_digits
 
 _SURE = 3.0
 _LEAST_SLIP = 0.1
@@ -60,6 +63,10 @@ _OTHERS = {
     ROUNDING: "force within one step of the converter",
     ARCHIVE: "changes within the dead band of the historian",
     UNSEEN: "what happens between two samples",
+    STROKES: "why the strokes differ",
+    AVERAGES: "what averages over other times would show",
+    AT_REST: "how friction at rest differs from that of the moves",
+    "lag": "lag between the signals",
 }
 """Words for the sources of uncertainty that are not imperfections."""
 
@@ -116,10 +123,13 @@ def main_doubt(one: Estimated, width: str) -> str:
 
     `width` is the text of `interval_share`.
     """
-    total = sum(source**2 for source in one.sources.values()) + one.record**2
+    sources = dict(one.sources)
+    if not any(name in TIMING for name in sources):
+        sources["lag"] = one.timing
+    total = sum(source**2 for source in sources.values()) + one.record**2
     named = [
         _OTHERS[name] if name in _OTHERS else IMPERFECTIONS[name].words
-        for name, source in sorted(one.sources.items(), key=lambda item: -item[1])
+        for name, source in sorted(sources.items(), key=lambda item: -item[1])
         if source**2 > _SHARE * total
     ]
     share = f"its interval is {width}"
@@ -133,7 +143,7 @@ def late_sensor(name: str, value: float) -> str:
     unit = UNITS.get(name, "N")
     return (
         f"it would be {value:.3g} {unit} with a slow stem sensor, whose lag the record cannot "
-        "separate from viscous friction; set timing_uncertainty"
+        f"separate from viscous friction; state {LAG_SETTING}"
     )
 
 
@@ -459,7 +469,7 @@ def doubted_by_sampling(
         return dict(parameters)
     reason = (
         f"one signal recorded a sample ({lasting(interval)}) late would change the sliding "
-        f"friction by {three_digits(abs(change))} N; set timing_uncertainty, 0 if both signals are "
+        f"friction by {three_digits(abs(change))} N; state {LAG_SETTING}: 0 if both signals are "
         "sampled together"
     )
     if abs(change) > abs(sliding.value):

@@ -302,11 +302,15 @@ def require_related_signals(recording: Recording) -> None:
     require_changing_drive(recording)
     slope, share, dissipates = _followed(recording)
     if share < _LEAST_FOLLOWED:
+        stamped = recording.stamped
+        period = recording.sample_period if stamped is None else stamped.drive.period
+        is_slow = period > _LEAST_SAMPLES_A_STROKE * recording.sample_period
+        slow = f"; a {words} every {lasting(period)} does not show shorter moves" if is_slow else ""
         raise RefusalError(
             f"{words} and stem do not move together (position and direction of the moving stem "
             f"explain {100 * share:.0f} % of the {words}): check that both signals belong to this "
             "valve, are not swapped, come from working sensors and share one clock, and that the "
-            "stem moves further than its friction holds it"
+            f"stem moves further than its friction holds it{slow}"
         )
     if slope < 0 and share > _SURELY_FOLLOWED and not dissipates:
         raise RefusalError(
