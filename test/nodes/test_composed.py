@@ -262,28 +262,44 @@ def test_a_transition_that_the_state_does_not_have_is_refused(live, compose, kin
     assert not node.failures
 
 
-@pytest.mark.parametrize("kind", [TurnExecutor, SingleThreadedExecutor])
-def test_a_clean_up_ends_an_identification(live, compose, monkeypatch, kind):
-    """What followed met topics and a service that were gone, and ended the executor of a user."""
-    begun, cleaned = threading.Event(), threading.Event()
+@pytest.fixture
+def held(monkeypatch):
+    """Identifications of this process begin, and wait until the second event."""
+    begun, released = threading.Event(), threading.Event()
 
     def slow(*arguments):
         begun.set()
-        cleaned.wait(60)
+        released.wait(60)
         return identify_with_numbers(*arguments)
 
     monkeypatch.setattr(workers, "identify_with_numbers", slow)
+    yield begun, released
+    released.set()
+
+
+AWAITING = [TurnExecutor, SingleThreadedExecutor, MultiThreadedExecutor]
+
+
+@pytest.mark.parametrize("kind", AWAITING)
+def test_a_clean_up_ends_an_identification(live, compose, held, kind):
+    """What followed met topics and a service that were gone, and ended the executor of a user.
+
+    The caller waited for an answer without end.
+    """
     client, node = live.client, compose(lifecycle=True)
     with spun(node, kind(context=compose.context)):
         assert change(client, Transition.TRANSITION_CONFIGURE)
         assert change(client, Transition.TRANSITION_ACTIVATE)
         client.connect()
         client.fill(quick_record())
-        client.request(Trigger, f"{NODE}/identify", Trigger.Request())
-        client.wait_until(begun.is_set, "an identification")
+        asked = client.request(Trigger, f"{NODE}/identify", Trigger.Request())
+        client.wait_until(held[0].is_set, "an identification")
         assert change(client, Transition.TRANSITION_DEACTIVATE)
         assert change(client, Transition.TRANSITION_CLEANUP)
-        cleaned.set()
+        answer = client.wait_until_answered(asked)
+        assert not answer.success
+        assert f"{NODE} was cleaned up before ~/identify had finished" in answer.message
+        held[1].set()
         for _ in range(2):
             client.drain()
             assert state(client) == State.PRIMARY_STATE_UNCONFIGURED
@@ -291,6 +307,31 @@ def test_a_clean_up_ends_an_identification(live, compose, monkeypatch, kind):
         assert change(client, Transition.TRANSITION_ACTIVATE)
         assert client.next_status().level == OK
     assert not node.failures
+
+
+@pytest.mark.parametrize("kind", AWAITING)
+def test_the_end_of_a_node_answers_what_it_was_asked(live, compose, held, kind):
+    """The caller waited for an answer without end; other nodes of the executor go on."""
+    client, node = live.client, compose()
+    executor = kind(context=compose.context)
+    turns = []
+    other = rclpy.create_node("other", context=compose.context)
+    other.create_timer(0.02, lambda: turns.append(time.monotonic()))
+    executor.add_node(other)
+    with spun(node, executor):
+        client.connect()
+        client.fill(quick_record())
+        asked = client.request(Trigger, f"{NODE}/identify", Trigger.Request())
+        client.wait_until(held[0].is_set, "an identification")
+        executor.remove_node(node)
+        node.destroy_node()
+        answer = client.wait_until_answered(asked)
+        assert not answer.success
+        assert f"{NODE} was stopped before ~/identify had finished" in answer.message
+        held[1].set()
+        before = len(turns)
+        client.wait_until(lambda: len(turns) > before + 5, "turns of the other node")
+    other.destroy_node()
 
 
 def test_a_server_that_does_not_answer_never_stops_the_executor(live, compose, tmp_path):

@@ -24,7 +24,7 @@ from rclpy.lifecycle import LifecycleNodeMixin, LifecycleState, TransitionCallba
 from rclpy.service import Service
 from rclpy.timer import Timer
 
-from valve_friction_ros.nodes.plumbing.polled_node import PolledNode
+from valve_friction_ros.nodes.plumbing.polled_node import PolledNode, drop_late_answers
 from valve_friction_ros.nodes.plumbing.worker import Worker, bugs_reported, done_in
 
 _WRONG = (ParameterException, RuntimeError, ValueError, OSError)
@@ -64,6 +64,7 @@ class ManagedNode(LifecycleNodeMixin, PolledNode):
             for service in self.services:
                 if service.srv_name.endswith("/change_state"):
                     service.callback = self._refusing(service.callback)
+                    drop_late_answers(service)
             self.get_logger().info("unconfigured: waiting for its first life-cycle transition")
             return
         try:
@@ -125,6 +126,7 @@ class ManagedNode(LifecycleNodeMixin, PolledNode):
     def _dissolve(self) -> None:
         """Return the node to the state before its configuration."""
         self.close()
+        self.answer_the_rest(one for one in self.services if id(one) not in self._before)
         for one, destroy in self._entities():
             if id(one) not in self._before and one is not self._poll_timer:
                 destroy(one)
@@ -132,12 +134,22 @@ class ManagedNode(LifecycleNodeMixin, PolledNode):
     def create_service(
         self, kind: Any, name: str, callback: Callable[..., Any], **named: Any
     ) -> Service:
-        """Create a service whose answers end with the configuration that they began in."""
+        """Create a service whose work ends with the configuration that it began in.
+
+        The caller is then told so in the `message` of the response.
+        """
         if not inspect.iscoroutinefunction(callback):
             return super().create_service(kind, name, callback, **named)
 
         async def answered(request: Any, response: Any) -> Any:
-            return await self._while_configured(callback(request, response)) or response
+            answer = await self._while_configured(callback(request, response))
+            if answer is None:
+                end = "stopped" if self._is_closed else "cleaned up"
+                response.message = (
+                    f"{self.get_fully_qualified_name()} was {end} before {name} had finished: "
+                    "call it again once the node is active"
+                )
+            return answer or response
 
         return super().create_service(kind, name, answered, **named)
 
