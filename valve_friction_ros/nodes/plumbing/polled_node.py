@@ -24,6 +24,7 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
 from rcl_interfaces.msg import SetParametersResult
+from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy.callback_groups import CallbackGroup
 from rclpy.clock import Clock, ClockType
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
@@ -46,7 +47,7 @@ from rclpy.timer import Timer
 from std_srvs.srv import Trigger
 
 from valve_friction_ros.identification.refusal import RefusalError
-from valve_friction_ros.nodes.plumbing.parameters import UNSET
+from valve_friction_ros.nodes.plumbing.parameters import UNSET, set_each, set_together
 from valve_friction_ros.nodes.plumbing.qos import REQUESTS
 from valve_friction_ros.nodes.plumbing.rclpy_private import (
     awaits_coroutines,
@@ -58,6 +59,8 @@ from valve_friction_ros.nodes.plumbing.worker import InternalError, bugs_reporte
 
 _LONGEST_TURN = 0.5
 """Longest time of a turn, s; callbacks that are still ready wait for the next turn."""
+_OF_PARAMETERS = {SetParameters: set_each, SetParametersAtomically: set_together}
+"""Services whose requests this package answers in place of rclpy."""
 _NO_TYPE_DESCRIPTIONS = Parameter("start_type_description_service", value=False)
 _POLL_PERIOD = 0.05
 """Period of polling in an executor of rclpy, s."""
@@ -194,6 +197,8 @@ class PolledNode(Node):
         self, kind: Any, name: str, callback: Callable[..., Any], **named: Any
     ) -> Service:
         """Create a service as rclpy does; a `TurnExecutor` polls its requests."""
+        if kind in _OF_PARAMETERS:
+            callback = functools.partial(_OF_PARAMETERS[kind], self)
         named["callback_group"] = self._services_in_turns
         service = super().create_service(kind, name, self.exclusive(callback), **named)
         drop_late_answers(service)
