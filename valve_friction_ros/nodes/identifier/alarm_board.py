@@ -153,12 +153,14 @@ class AlarmBoard:
     def _take(self, events: Sequence[AlarmEvent]) -> None:
         self.alarms |= {one.alarm.kind: one.alarm for one in events}
         for one in events:
-            by = f" by {one.who}" if one.who else ""
-            said = one.text or (one.alarm.message if one.alarm.is_active else "")
-            words = f": {said}" if said else ""
-            self._node.get_logger().info(
-                f"alarm {one.alarm.kind.words} {one.action.value}{by}{words}"
-            )
+            line = f"alarm {one.alarm.kind.words} {one.action.value}"
+            if one.who:
+                line += f" by {one.who}"
+            if one.text:
+                line += f", comment: {one.text}"
+            elif one.alarm.is_active:
+                line += f"{', condition' if one.who else ''}: {one.alarm.message}"
+            self._node.get_logger().info(line)
 
     def _settle(self) -> None:
         """Adopt the alarms of the history once our change is written: others write there too."""
