@@ -277,6 +277,22 @@ def held(monkeypatch):
     released.set()
 
 
+def test_a_result_of_another_valve_is_refused(live, compose, held):
+    """It raised and ended alarms, and went into the history, with the parameters of this valve."""
+    client, node = live.client, compose()
+    with spun(node, TurnExecutor(context=compose.context)):
+        client.connect()
+        client.fill(quick_record())
+        asked = client.request(Trigger, f"{NODE}/identify", Trigger.Request())
+        client.wait_until(held[0].is_set, "an identification")
+        client.set_parameters(NODE, {"diaphragm_area": 0.09})
+        held[1].set()
+        answer = client.wait_until_answered(asked)
+        assert not answer.success
+        assert "the parameters of the valve were changed during" in answer.message
+        assert client.status_values()["estimate_valid"] == "false"
+
+
 AWAITING = [TurnExecutor, SingleThreadedExecutor, MultiThreadedExecutor]
 
 
@@ -298,7 +314,9 @@ def test_a_clean_up_ends_an_identification(live, compose, held, kind):
         assert change(client, Transition.TRANSITION_CLEANUP)
         answer = client.wait_until_answered(asked)
         assert not answer.success
-        assert f"{NODE} was cleaned up before ~/identify had finished" in answer.message
+        assert (
+            f"{NODE} was cleaned up or shut down before ~/identify had finished" in answer.message
+        )
         held[1].set()
         for _ in range(2):
             client.drain()

@@ -144,7 +144,7 @@ class ManagedNode(LifecycleNodeMixin, PolledNode):
         async def answered(request: Any, response: Any) -> Any:
             answer = await self._while_configured(callback(request, response))
             if answer is None:
-                end = "stopped" if self._is_closed else "cleaned up"
+                end = "stopped" if self._is_closed else "cleaned up or shut down"
                 response.message = (
                     f"{self.get_fully_qualified_name()} was {end} before {name} had finished: "
                     "call it again once the node is active"
