@@ -372,6 +372,11 @@ def test_a_server_that_does_not_answer_never_stops_the_executor(live, compose, t
             cleaned = time.monotonic()
             assert change(client, Transition.TRANSITION_CLEANUP)
             assert time.monotonic() - cleaned < 1.0
+            request = ChangeState.Request(transition=Transition(label="configure"))
+            asked = client.request(ChangeState, f"{NODE}/change_state", request)
+            client.wait_until(lambda: "await" in str(threading.enumerate()), "a wait")
+            node.destroy_node()
+            assert not client.wait_until_answered(asked).success
         assert sum(one > begun for one in turns) > 20
         other.destroy_node()
 

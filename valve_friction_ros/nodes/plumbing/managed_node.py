@@ -85,7 +85,7 @@ class ManagedNode(LifecycleNodeMixin, PolledNode):
             if asked.label == "configure" or asked.id == Transition.TRANSITION_CONFIGURE:
                 worker = Worker("await")
                 with self.guarded("await"):
-                    await done_in(worker, self.await_others)
+                    await self._while_configured(done_in(worker, self.await_others))
                 worker.shutdown(wait=False)
             with contextlib.suppress(RuntimeError):  # RCLError, which is not public
                 if not self._is_closed:

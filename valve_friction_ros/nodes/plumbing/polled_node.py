@@ -64,8 +64,8 @@ _OF_PARAMETERS = {SetParameters: set_each, SetParametersAtomically: set_together
 _NO_TYPE_DESCRIPTIONS = Parameter("start_type_description_service", value=False)
 _POLL_PERIOD = 0.05
 """Period of polling in an executor of rclpy, s."""
-_ANSWER_PATIENCE = 1.0
-"""Time, s, that the end allows another thread of the executor to give an answer."""
+_ANSWER_PATIENCE, _ANSWER_PAUSE = 1.0, 1e-3
+"""Time, s, that the end allows other threads of the executor to answer, and between two looks."""
 _STEP_PATIENCE = 1.0
 """Time that the end allows for a step blocked by a full queue of the middleware, s."""
 
@@ -213,9 +213,11 @@ class PolledNode(Node):
         else:
             held = tasks_of(executor)
         tasks = [task for task, service in held if service in ending]
-        while not all(task.done() for task in tasks) and time.monotonic() < deadline:
+        while tasks and time.monotonic() < deadline:
             for task in tasks:
                 task()
+            tasks = [task for task in tasks if not task.done()]  # another thread is just at them
+            time.sleep(_ANSWER_PAUSE if tasks else 0.0)
 
     def create_timer(
         self, timer_period_sec: float, callback: Callable[..., Any], *arguments: Any, **named: Any
