@@ -249,6 +249,14 @@ def test_life_cycle(live, compose):
         assert state(client) == State.PRIMARY_STATE_FINALIZED
 
 
+def test_a_managed_node_that_has_ended_leaves_the_graph(live, compose):
+    """Its state machine kept it there, for 20 s after the end of a process."""
+    client, node = live.client, compose(lifecycle=True)
+    client.wait_until(lambda: "identifier" in client.node.get_node_names(), "the node")
+    node.destroy_node()
+    client.wait_until(lambda: "identifier" not in client.node.get_node_names(), "its end", 10.0)
+
+
 @pytest.mark.parametrize("kind", [TurnExecutor, SingleThreadedExecutor])
 def test_a_transition_that_the_state_does_not_have_is_refused(live, compose, kind):
     """It was never answered, and ended the executor of a user."""

@@ -123,6 +123,15 @@ class ManagedNode(LifecycleNodeMixin, PolledNode):
         self.opened_before.close()
         self.opened.close()
 
+    def destroy_node(self) -> None:
+        """Close the node and remove it from the graph, with its state machine.
+
+        rclpy leaves the machine, which keeps the node in the graphs of others for another 20 s.
+        """
+        super().destroy_node()
+        if self.get_parameter("lifecycle").value:
+            self._state_machine.destroy_when_not_in_use()
+
     def _dissolve(self) -> None:
         """Return the node to the state before its configuration."""
         self.close()
