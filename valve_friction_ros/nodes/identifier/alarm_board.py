@@ -102,8 +102,9 @@ class AlarmBoard:
         if not node.tells_parameters:
             return  # a request needs the parameter alarm_who
         for name in ("acknowledge", "shelve", "unshelve", "comment"):
-            create_service(node, f"~/{name}", partial(self._ask, AlarmAction[name.upper()]))
-        create_service(node, "~/out_of_service", self._switch, kind=SetBool)
+            ask = partial(self._ask, AlarmAction[name.upper()])
+            create_service(node, f"~/{name}", ask, is_dated=True)
+        create_service(node, "~/out_of_service", self._switch, kind=SetBool, is_dated=True)
 
     def _condition(self, kind: AlarmKind) -> Condition:
         return self.alarms[kind].condition if kind in self.alarms else NO_CONDITION

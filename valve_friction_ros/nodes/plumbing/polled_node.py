@@ -479,18 +479,27 @@ async def _answer(node: Node, service: Service, request: object, header: object)
         service.send_response(response, header)
 
 
+def lack_of_time(node: Node) -> str:
+    """Return the problem of a node whose simulated time has not started, or ''."""
+    clock = node.get_clock()
+    if not clock.ros_time_is_active or clock.now().nanoseconds:
+        return ""
+    return "no time on /clock although use_sim_time is set: publish a clock, or unset use_sim_time"
+
+
 def create_service(
     node: PolledNode,
     name: str,
     work: Callable[..., Awaitable[str]],
     failure: str = "",
     kind: type = Trigger,
+    is_dated: bool = False,
 ) -> None:
     """Create a std_srvs/Trigger service, or a SetBool service whose value `work` receives.
 
     The coroutine `work` returns the message of a success, or raises RefusalError with the reason;
     any other exception is answered as an internal error. If `failure` is given, a refusal is logged
-    after this text.
+    after this text. Work whose result `is_dated` is refused until simulated time has started.
     """
 
     async def answer(request: Any, response: Any) -> Any:
@@ -500,6 +509,8 @@ def create_service(
                     f"{node.get_fully_qualified_name()} is inactive: activate it, for example "
                     f"with `ros2 lifecycle set {node.get_fully_qualified_name()} activate`"
                 )
+            if is_dated and (problem := lack_of_time(node)):
+                raise RefusalError(problem)
             with bugs_reported(node):
                 response.message = await (work() if kind is Trigger else work(request.data))
             response.success = True
