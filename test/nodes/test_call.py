@@ -168,9 +168,22 @@ def test_nobody_is_there(live, call):
     assert "there is no identifier at all: start one, or set its ROS_DOMAIN_ID" in err
 
 
-def test_the_node_ends_meanwhile(busy):
+def test_the_node_is_stopped_meanwhile(busy):
     process = waiting(busy)
     busy.nodes[0].stop()
+    assert ended(process) == (
+        2,
+        "",
+        "valve_friction call: /fv_101/identifier: the node was stopped before ~/identify had "
+        "finished: call it again once the node is active\n",
+    )
+
+
+def test_the_node_is_killed_meanwhile(live):
+    live.start_identifier(script=faulty("slow"))
+    live.client.fill(quick_record())
+    process = waiting(live)
+    live.kill(live.nodes[0])
     assert ended(process) == (
         2,
         "",

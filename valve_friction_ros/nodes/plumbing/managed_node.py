@@ -155,8 +155,8 @@ class ManagedNode(LifecycleNodeMixin, PolledNode):
             if answer is None:
                 end = "stopped" if self._is_closed else "cleaned up or shut down"
                 response.message = (
-                    f"{self.get_fully_qualified_name()} was {end} before {name} had finished: "
-                    "call it again once the node is active"
+                    f"the node was {end} before {name} had finished: call it again once the node "
+                    "is active"
                 )
             return answer or response
 
