@@ -125,7 +125,9 @@ def _wrong_type(settings: Iterable[Setting], changes: Iterable[Parameter]) -> st
             Parameter.Type.DOUBLE: f"write {value}.0" if is_whole else "write a number",
             Parameter.Type.INTEGER: "write a whole number",
         }.get(wanted, f"put it in quotes, '{value}'")
-        return f"{change.name}: expected '{wanted}' got '{change.type_}': {remedy}"
+        # By name, because the types of Kilted format as numbers.
+        types = f"expected 'Type.{wanted.name}' got 'Type.{change.type_.name}'"
+        return f"{change.name}: {types}: {remedy}"
     return ""
 
 
