@@ -18,6 +18,8 @@ import sys
 import time
 from pathlib import Path
 
+BEGUN = "begun"
+"""Tells that an identification has begun."""
 FINISH = "finish"
 """Lets an identification, or the writing of a bag, end."""
 MENDED = "mended"
@@ -53,6 +55,7 @@ def slow():
     identify_once = workers.identify_with_numbers
 
     def identify_again_and_again(*arguments):
+        Path(BEGUN).touch()
         while True:
             estimate = identify_once(*arguments)
             if Path(FINISH).exists():

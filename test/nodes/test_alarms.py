@@ -235,6 +235,12 @@ def test_settings_name_the_alarms():
     assert tuple(one.value for one in AlarmKind) == ALARM_KINDS
 
 
+def require_logged(live, words):
+    """What the valve shows must not read as the comment of a person."""
+    log = live.nodes[-1]
+    live.client.wait_until(lambda: f"alarm friction high {words}" in log.errors, words)
+
+
 @pytest.mark.slow
 def test_a_life_of_an_alarm(live, history):
     client = live.client_of_identifier(KNOWN)
@@ -252,10 +258,12 @@ def test_a_life_of_an_alarm(live, history):
     assert refused == "the parameter alarm_who is empty: set it to your name"
     answer = ask(client, "acknowledge", text="repack on Monday")
     assert (answer.success, answer.message) == (True, "friction high: acknowledged")
+    require_logged(live, "acknowledged by A. Operator, comment: repack on Monday")
     live.restart(KNOWN)
     state(client, "friction_high", "acknowledged")
     answer = ask(client, "shelve", hours=2.0, kind="friction_high")
     assert answer.message.startswith("friction high: shelved until 20")
+    require_logged(live, "shelved by A. Operator, condition: excess friction")
     shelved = values_of(state(client, "friction_high", "shelved"))
     assert shelved["alarm friction_high level"] == "ERROR"
     assert shelved["alarm friction_high until [time]"].startswith("20")

@@ -13,12 +13,11 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from functools import partial
 from pathlib import Path
 
 import pytest
-from faulty_identifier import FINISH, faulty
+from faulty_identifier import BEGUN, FINISH, faulty
 from live_nodes import NAMESPACE, PROJECT
 from records import quick_record
 
@@ -144,11 +143,10 @@ def test_the_timeout_ends_the_command_and_the_node_goes_on(busy):
 
 def waiting(bench):
     """Start the command, which waits for an identification that does not end."""
+    begun = bench.folder / BEGUN
+    begun.unlink(missing_ok=True)
     process = start(bench.domain, NAMESPACE, "identify")
-    service = f"{NAMESPACE}/identifier/identify"
-    client = bench.client
-    client.wait_until(lambda: client.node.count_clients(service), "the caller")
-    time.sleep(2.0)  # its call follows a moment later
+    bench.client.wait_until(begun.exists, "an identification")
     return process
 
 
@@ -168,9 +166,22 @@ def test_nobody_is_there(live, call):
     assert "there is no identifier at all: start one, or set its ROS_DOMAIN_ID" in err
 
 
-def test_the_node_ends_meanwhile(busy):
+def test_the_node_is_stopped_meanwhile(busy):
     process = waiting(busy)
     busy.nodes[0].stop()
+    assert ended(process) == (
+        2,
+        "",
+        "valve_friction call: /fv_101/identifier: the node was stopped before ~/identify had "
+        "finished: call it again once the node is active\n",
+    )
+
+
+def test_the_node_is_killed_meanwhile(live):
+    live.start_identifier(script=faulty("slow"))
+    live.client.fill(quick_record())
+    process = waiting(live)
+    live.kill(live.nodes[0])
     assert ended(process) == (
         2,
         "",

@@ -249,6 +249,14 @@ def test_life_cycle(live, compose):
         assert state(client) == State.PRIMARY_STATE_FINALIZED
 
 
+def test_a_managed_node_that_has_ended_leaves_the_graph(live, compose):
+    """Its state machine kept it there, for 20 s after the end of a process."""
+    client, node = live.client, compose(lifecycle=True)
+    client.wait_until(lambda: "identifier" in client.node.get_node_names(), "the node")
+    node.destroy_node()
+    client.wait_until(lambda: "identifier" not in client.node.get_node_names(), "its end", 10.0)
+
+
 @pytest.mark.parametrize("kind", [TurnExecutor, SingleThreadedExecutor])
 def test_a_transition_that_the_state_does_not_have_is_refused(live, compose, kind):
     """It was never answered, and ended the executor of a user."""
@@ -262,28 +270,62 @@ def test_a_transition_that_the_state_does_not_have_is_refused(live, compose, kin
     assert not node.failures
 
 
-@pytest.mark.parametrize("kind", [TurnExecutor, SingleThreadedExecutor])
-def test_a_clean_up_ends_an_identification(live, compose, monkeypatch, kind):
-    """What followed met topics and a service that were gone, and ended the executor of a user."""
-    begun, cleaned = threading.Event(), threading.Event()
+@pytest.fixture
+def held(monkeypatch):
+    """Identifications of this process begin, and wait until the second event."""
+    begun, released = threading.Event(), threading.Event()
 
     def slow(*arguments):
         begun.set()
-        cleaned.wait(60)
+        released.wait(60)
         return identify_with_numbers(*arguments)
 
     monkeypatch.setattr(workers, "identify_with_numbers", slow)
+    yield begun, released
+    released.set()
+
+
+def test_a_result_of_another_valve_is_refused(live, compose, held):
+    """It raised and ended alarms, and went into the history, with the parameters of this valve."""
+    client, node = live.client, compose()
+    with spun(node, TurnExecutor(context=compose.context)):
+        client.connect()
+        client.fill(quick_record())
+        asked = client.request(Trigger, f"{NODE}/identify", Trigger.Request())
+        client.wait_until(held[0].is_set, "an identification")
+        client.set_parameters(NODE, {"diaphragm_area": 0.09})
+        held[1].set()
+        answer = client.wait_until_answered(asked)
+        assert not answer.success
+        assert "the parameters of the valve were changed during" in answer.message
+        assert client.status_values()["estimate_valid"] == "false"
+
+
+AWAITING = [TurnExecutor, SingleThreadedExecutor, MultiThreadedExecutor]
+
+
+@pytest.mark.parametrize("kind", AWAITING)
+def test_a_clean_up_ends_an_identification(live, compose, held, kind):
+    """What followed met topics and a service that were gone, and ended the executor of a user.
+
+    The caller waited for an answer without end.
+    """
     client, node = live.client, compose(lifecycle=True)
     with spun(node, kind(context=compose.context)):
         assert change(client, Transition.TRANSITION_CONFIGURE)
         assert change(client, Transition.TRANSITION_ACTIVATE)
         client.connect()
         client.fill(quick_record())
-        client.request(Trigger, f"{NODE}/identify", Trigger.Request())
-        client.wait_until(begun.is_set, "an identification")
+        asked = client.request(Trigger, f"{NODE}/identify", Trigger.Request())
+        client.wait_until(held[0].is_set, "an identification")
         assert change(client, Transition.TRANSITION_DEACTIVATE)
         assert change(client, Transition.TRANSITION_CLEANUP)
-        cleaned.set()
+        answer = client.wait_until_answered(asked)
+        assert not answer.success
+        assert (
+            "the node was cleaned up or shut down before ~/identify had finished" in answer.message
+        )
+        held[1].set()
         for _ in range(2):
             client.drain()
             assert state(client) == State.PRIMARY_STATE_UNCONFIGURED
@@ -291,6 +333,31 @@ def test_a_clean_up_ends_an_identification(live, compose, monkeypatch, kind):
         assert change(client, Transition.TRANSITION_ACTIVATE)
         assert client.next_status().level == OK
     assert not node.failures
+
+
+@pytest.mark.parametrize("kind", AWAITING)
+def test_the_end_of_a_node_answers_what_it_was_asked(live, compose, held, kind):
+    """The caller waited for an answer without end; other nodes of the executor go on."""
+    client, node = live.client, compose()
+    executor = kind(context=compose.context)
+    turns = []
+    other = rclpy.create_node("other", context=compose.context)
+    other.create_timer(0.02, lambda: turns.append(time.monotonic()))
+    executor.add_node(other)
+    with spun(node, executor):
+        client.connect()
+        client.fill(quick_record())
+        asked = client.request(Trigger, f"{NODE}/identify", Trigger.Request())
+        client.wait_until(held[0].is_set, "an identification")
+        executor.remove_node(node)
+        node.destroy_node()
+        answer = client.wait_until_answered(asked)
+        assert not answer.success
+        assert "the node was stopped before ~/identify had finished" in answer.message
+        held[1].set()
+        before = len(turns)
+        client.wait_until(lambda: len(turns) > before + 5, "turns of the other node")
+    other.destroy_node()
 
 
 def test_a_server_that_does_not_answer_never_stops_the_executor(live, compose, tmp_path):
@@ -313,6 +380,11 @@ def test_a_server_that_does_not_answer_never_stops_the_executor(live, compose, t
             cleaned = time.monotonic()
             assert change(client, Transition.TRANSITION_CLEANUP)
             assert time.monotonic() - cleaned < 1.0
+            request = ChangeState.Request(transition=Transition(label="configure"))
+            asked = client.request(ChangeState, f"{NODE}/change_state", request)
+            client.wait_until(lambda: "await" in str(threading.enumerate()), "a wait")
+            node.destroy_node()
+            assert not client.wait_until_answered(asked).success
         assert sum(one > begun for one in turns) > 20
         other.destroy_node()
 

@@ -392,6 +392,23 @@ def test_a_node_loads_nothing_that_only_a_later_request_needs(node):
     assert HEAVY.isdisjoint(loaded)
 
 
+def test_moves_in_service_load_no_numeric_library_but_numpy():
+    """26 MB of a node whose identifications have a process of their own."""
+    code = """
+import sys
+import valve_friction_ros.nodes.identifier.node
+from valve_friction_ros.evidence import evidence_of
+
+sys.path.append("test/support")
+from service import VALVE, made_moves
+
+assert evidence_of(made_moves(1.0, lambda _: 300.0), VALVE, None).is_known
+print(*sys.modules)
+"""
+    heavy = {"numba", "scipy.special", "scipy.linalg", "scipy.optimize", "scipy.signal"}
+    assert heavy.isdisjoint(python(code).split())
+
+
 def test_a_dashboard_loads_no_numeric_library_but_numpy():
     """A second of its start and 50 MB."""
     pytest.importorskip("nicegui", reason="NiceGUI is not installed")

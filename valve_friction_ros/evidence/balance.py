@@ -17,7 +17,6 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from valve_friction_ros.evidence.moves import Moves
@@ -212,7 +211,7 @@ def scales_of(moves: Moves, levels: NDArray[np.intp]) -> Scales:
     )
     rows = np.column_stack((moves.direction, moves.place - place, np.ones(len(moves))))
     root = np.sqrt(moves.distance)
-    found = scipy.linalg.lstsq(rows * root[:, None], moves.force * root)[0]
+    found = np.linalg.lstsq(rows * root[:, None], moves.force * root, rcond=None)[0]
     least = 1e-9 * (1.0 + float(np.max(np.abs(moves.force))))
     return Scales(max(abs(float(found[0])), least), place, speed)
 

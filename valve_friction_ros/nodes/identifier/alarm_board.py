@@ -102,8 +102,9 @@ class AlarmBoard:
         if not node.tells_parameters:
             return  # a request needs the parameter alarm_who
         for name in ("acknowledge", "shelve", "unshelve", "comment"):
-            create_service(node, f"~/{name}", partial(self._ask, AlarmAction[name.upper()]))
-        create_service(node, "~/out_of_service", self._switch, kind=SetBool)
+            ask = partial(self._ask, AlarmAction[name.upper()])
+            create_service(node, f"~/{name}", ask, is_dated=True)
+        create_service(node, "~/out_of_service", self._switch, kind=SetBool, is_dated=True)
 
     def _condition(self, kind: AlarmKind) -> Condition:
         return self.alarms[kind].condition if kind in self.alarms else NO_CONDITION
@@ -153,12 +154,14 @@ class AlarmBoard:
     def _take(self, events: Sequence[AlarmEvent]) -> None:
         self.alarms |= {one.alarm.kind: one.alarm for one in events}
         for one in events:
-            by = f" by {one.who}" if one.who else ""
-            said = one.text or (one.alarm.message if one.alarm.is_active else "")
-            words = f": {said}" if said else ""
-            self._node.get_logger().info(
-                f"alarm {one.alarm.kind.words} {one.action.value}{by}{words}"
-            )
+            line = f"alarm {one.alarm.kind.words} {one.action.value}"
+            if one.who:
+                line += f" by {one.who}"
+            if one.text:
+                line += f", comment: {one.text}"
+            elif one.alarm.is_active:
+                line += f"{', condition' if one.who else ''}: {one.alarm.message}"
+            self._node.get_logger().info(line)
 
     def _settle(self) -> None:
         """Adopt the alarms of the history once our change is written: others write there too."""

@@ -65,7 +65,7 @@ from valve_friction_ros.nodes.plumbing.parameters import (
     valve_from,
     warn_of_columns,
 )
-from valve_friction_ros.nodes.plumbing.polled_node import create_service
+from valve_friction_ros.nodes.plumbing.polled_node import create_service, lack_of_time
 from valve_friction_ros.nodes.plumbing.running import run_nodes
 from valve_friction_ros.nodes.plumbing.worker import InternalError, Readiness
 from valve_friction_ros.settings import (
@@ -272,7 +272,7 @@ class Identifier(ManagedNode):
             ("clear", self._clear, ""),
             ("reset_usage", partial(self._shown, self._reset_usage), ""),
         ):
-            create_service(self, f"~/{name}", work, failure)
+            create_service(self, f"~/{name}", work, failure, is_dated=name != "clear")
         steady = Clock(clock_type=ClockType.STEADY_TIME)  # sim time may never start, or stop
         self.create_timer(_DIAGNOSTIC_PERIOD, self._tell, clock=steady)
         jumps = self.get_clock().create_jump_callback(
@@ -435,12 +435,8 @@ class Identifier(ManagedNode):
         return await self._usage.reset()
 
     def _silence(self) -> list[str]:
-        clock = self.get_clock()
-        if clock.ros_time_is_active and not clock.now().nanoseconds:
-            return [
-                "no time on /clock although use_sim_time is set: publish a clock, or unset "
-                "use_sim_time"
-            ]
+        if problem := lack_of_time(self):
+            return [problem]
         return self._inputs.problems(self.get_parameter("input_timeout").value)
 
     def _faults(self) -> dict[Statement, Statement]:

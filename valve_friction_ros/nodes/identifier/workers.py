@@ -192,8 +192,9 @@ class Identification:
     async def run(self, record: IdentificationInput) -> None:
         """Identify a record in the worker; adopt and publish the result.
 
-        Raises RefusedRecordError if the record cannot be identified or is old, InternalError for a
-        bug, which the monitor reports until an identification succeeds. The findings of a refused
+        Raises RefusedRecordError if the record cannot be identified, is old or of a valve that has
+        since been changed, InternalError for a bug, which the monitor reports until an
+        identification succeeds. The findings of a refused
         record are adopted too.
         """
         self._require_recent()
@@ -208,6 +209,12 @@ class Identification:
                     record.snapshot,
                     record.settings,
                 )
+                if record.settings.valve != self._monitor.settings.valve:
+                    raise RefusedRecordError(
+                        "the parameters of the valve were changed during the identification: "
+                        "identify again once the buffer holds new strokes",
+                        {},
+                    )
                 now = self._node.get_clock().now().nanoseconds
                 self._monitor.accept(result, now, numbers)
                 self._results.publish(result, self._monitor)

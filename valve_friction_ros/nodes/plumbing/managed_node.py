@@ -24,7 +24,7 @@ from rclpy.lifecycle import LifecycleNodeMixin, LifecycleState, TransitionCallba
 from rclpy.service import Service
 from rclpy.timer import Timer
 
-from valve_friction_ros.nodes.plumbing.polled_node import PolledNode
+from valve_friction_ros.nodes.plumbing.polled_node import PolledNode, drop_late_answers
 from valve_friction_ros.nodes.plumbing.worker import Worker, bugs_reported, done_in
 
 _WRONG = (ParameterException, RuntimeError, ValueError, OSError)
@@ -64,6 +64,7 @@ class ManagedNode(LifecycleNodeMixin, PolledNode):
             for service in self.services:
                 if service.srv_name.endswith("/change_state"):
                     service.callback = self._refusing(service.callback)
+                    drop_late_answers(service)
             self.get_logger().info("unconfigured: waiting for its first life-cycle transition")
             return
         try:
@@ -84,7 +85,7 @@ class ManagedNode(LifecycleNodeMixin, PolledNode):
             if asked.label == "configure" or asked.id == Transition.TRANSITION_CONFIGURE:
                 worker = Worker("await")
                 with self.guarded("await"):
-                    await done_in(worker, self.await_others)
+                    await self._while_configured(done_in(worker, self.await_others))
                 worker.shutdown(wait=False)
             with contextlib.suppress(RuntimeError):  # RCLError, which is not public
                 if not self._is_closed:
@@ -122,9 +123,19 @@ class ManagedNode(LifecycleNodeMixin, PolledNode):
         self.opened_before.close()
         self.opened.close()
 
+    def destroy_node(self) -> None:
+        """Close the node and remove it from the graph, with its state machine.
+
+        rclpy leaves the machine, which keeps the node in the graphs of others for another 20 s.
+        """
+        super().destroy_node()
+        if self.get_parameter("lifecycle").value:
+            self._state_machine.destroy_when_not_in_use()
+
     def _dissolve(self) -> None:
         """Return the node to the state before its configuration."""
         self.close()
+        self.answer_the_rest(one for one in self.services if id(one) not in self._before)
         for one, destroy in self._entities():
             if id(one) not in self._before and one is not self._poll_timer:
                 destroy(one)
@@ -132,12 +143,22 @@ class ManagedNode(LifecycleNodeMixin, PolledNode):
     def create_service(
         self, kind: Any, name: str, callback: Callable[..., Any], **named: Any
     ) -> Service:
-        """Create a service whose answers end with the configuration that they began in."""
+        """Create a service whose work ends with the configuration that it began in.
+
+        The caller is then told so in the `message` of the response.
+        """
         if not inspect.iscoroutinefunction(callback):
             return super().create_service(kind, name, callback, **named)
 
         async def answered(request: Any, response: Any) -> Any:
-            return await self._while_configured(callback(request, response)) or response
+            answer = await self._while_configured(callback(request, response))
+            if answer is None:
+                end = "stopped" if self._is_closed else "cleaned up or shut down"
+                response.message = (
+                    f"the node was {end} before {name} had finished: call it again once the node "
+                    "is active"
+                )
+            return answer or response
 
         return super().create_service(kind, name, answered, **named)
 

@@ -17,6 +17,7 @@ import sys
 from collections.abc import Callable, Collection, Iterable, Mapping
 from typing import Any
 
+from rcl_interfaces import msg, srv
 from rcl_interfaces.msg import (
     FloatingPointRange,
     IntegerRange,
@@ -124,7 +125,9 @@ def _wrong_type(settings: Iterable[Setting], changes: Iterable[Parameter]) -> st
             Parameter.Type.DOUBLE: f"write {value}.0" if is_whole else "write a number",
             Parameter.Type.INTEGER: "write a whole number",
         }.get(wanted, f"put it in quotes, '{value}'")
-        return f"{change.name}: expected '{wanted}' got '{change.type_}': {remedy}"
+        # By name, because the types of Kilted format as numbers.
+        types = f"expected 'Type.{wanted.name}' got 'Type.{change.type_.name}'"
+        return f"{change.name}: {types}: {remedy}"
     return ""
 
 
@@ -194,6 +197,70 @@ def reject_invalid(
         return SetParametersResult(successful=not reason, reason=reason)
 
     node.add_on_set_parameters_callback(check)
+
+
+def _changes(node: Node, messages: Iterable[msg.Parameter]) -> list[Parameter | str]:
+    """Return the parameters of a request, and for those that nobody can set the reason."""
+    known = node.list_parameters([], 0).names
+    changes: list[Parameter | str] = []
+    for one in messages:
+        if not node.has_parameter(one.name):
+            reason = f"{node.get_name()} has no parameter {one.name!r}: {nearest(one.name, known)}"
+            changes.append(reason)
+            continue
+        try:
+            changes.append(Parameter.from_parameter_msg(one))
+        except ValueError:
+            kinds = ", ".join(f"{kind.value} {kind.name.lower()}" for kind in Parameter.Type)
+            changes.append(f"{one.name}: there is no type {one.value.type}: choose from {kinds}")
+    return changes
+
+
+def set_together(
+    node: Node,
+    request: srv.SetParametersAtomically.Request,
+    response: srv.SetParametersAtomically.Response,
+) -> srv.SetParametersAtomically.Response:
+    """Answer ``~/set_parameters_atomically``: set all parameters or none."""
+    changes = _changes(node, request.parameters)
+    if reasons := [one for one in changes if isinstance(one, str)]:
+        response.result = SetParametersResult(successful=False, reason="; ".join(reasons))
+    else:
+        response.result = node.set_parameters_atomically(changes)
+    return response
+
+
+def set_each(
+    node: Node, request: srv.SetParameters.Request, response: srv.SetParameters.Response
+) -> srv.SetParameters.Response:
+    """Answer ``~/set_parameters``: set all parameters at once, or else those that can be set.
+
+    rclpy sets one after the other. ``ros2 param load`` so lost part of a valid file, whose limits,
+    for example, contradict those before it until both are set. Here the order has no effect.
+    """
+    results: dict[int, SetParametersResult] = {}
+    left: dict[int, Parameter] = {}
+    for number, change in enumerate(_changes(node, request.parameters)):
+        if isinstance(change, str):
+            results[number] = SetParametersResult(successful=False, reason=change)
+        else:
+            left[number] = change
+    free = [
+        number for number, one in left.items() if not node.describe_parameter(one.name).read_only
+    ]
+    if free and node.set_parameters_atomically([left[number] for number in free]).successful:
+        results |= {number: SetParametersResult(successful=True) for number in free}
+        left = {number: one for number, one in left.items() if number not in free}
+    has_changed = True
+    while has_changed:  # a change may need another that comes later
+        has_changed = False
+        for number, one in [*left.items()]:
+            results[number] = node.set_parameters_atomically([one])
+            if results[number].successful:
+                del left[number]
+                has_changed = True
+    response.results = [results[number] for number in range(len(request.parameters))]
+    return response
 
 
 def valve_from(values: Mapping[str, Any]) -> Valve:

@@ -19,11 +19,12 @@ import inspect
 import threading
 import time
 import types
-from collections.abc import Awaitable, Callable, Coroutine, Generator, Iterator
+from collections.abc import Awaitable, Callable, Coroutine, Generator, Iterable, Iterator
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
 from rcl_interfaces.msg import SetParametersResult
+from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy.callback_groups import CallbackGroup
 from rclpy.clock import Clock, ClockType
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
@@ -46,20 +47,25 @@ from rclpy.timer import Timer
 from std_srvs.srv import Trigger
 
 from valve_friction_ros.identification.refusal import RefusalError
-from valve_friction_ros.nodes.plumbing.parameters import UNSET
+from valve_friction_ros.nodes.plumbing.parameters import UNSET, set_each, set_together
 from valve_friction_ros.nodes.plumbing.qos import REQUESTS
 from valve_friction_ros.nodes.plumbing.rclpy_private import (
     awaits_coroutines,
     take_request,
     takes_directly,
+    tasks_of,
 )
 from valve_friction_ros.nodes.plumbing.worker import InternalError, bugs_reported
 
 _LONGEST_TURN = 0.5
 """Longest time of a turn, s; callbacks that are still ready wait for the next turn."""
+_OF_PARAMETERS = {SetParameters: set_each, SetParametersAtomically: set_together}
+"""Services whose requests this package answers in place of rclpy."""
 _NO_TYPE_DESCRIPTIONS = Parameter("start_type_description_service", value=False)
 _POLL_PERIOD = 0.05
 """Period of polling in an executor of rclpy, s."""
+_ANSWER_PATIENCE, _ANSWER_PAUSE = 1.0, 1e-3
+"""Time, s, that the end allows other threads of the executor to answer, and between two looks."""
 _STEP_PATIENCE = 1.0
 """Time that the end allows for a step blocked by a full queue of the middleware, s."""
 
@@ -190,20 +196,28 @@ class PolledNode(Node):
     def create_service(
         self, kind: Any, name: str, callback: Callable[..., Any], **named: Any
     ) -> Service:
-        """Create a service as rclpy does; a `TurnExecutor` polls its requests.
-
-        An answer that comes after the service was destroyed is dropped.
-        """
+        """Create a service as rclpy does; a `TurnExecutor` polls its requests."""
+        if kind in _OF_PARAMETERS:
+            callback = functools.partial(_OF_PARAMETERS[kind], self)
         named["callback_group"] = self._services_in_turns
         service = super().create_service(kind, name, self.exclusive(callback), **named)
-        send = service.send_response
-
-        def send_response(response: Any, header: Any) -> None:
-            with contextlib.suppress(InvalidHandle):
-                send(response, header)
-
-        service.send_response = send_response  # rclpy would end its executor
+        drop_late_answers(service)
         return service
+
+    def answer_the_rest(self, services: Iterable[Service]) -> None:
+        """Answer the requests whose work `close` has ended, before the services are destroyed."""
+        ending, deadline = {*services}, time.monotonic() + _ANSWER_PATIENCE
+        executor = self.executor
+        if isinstance(executor, TurnExecutor):
+            held = [*executor.answers.items()]
+        else:
+            held = tasks_of(executor)
+        tasks = [task for task, service in held if service in ending]
+        while tasks and time.monotonic() < deadline:
+            for task in tasks:
+                task()
+            tasks = [task for task in tasks if not task.done()]  # another thread is just at them
+            time.sleep(_ANSWER_PAUSE if tasks else 0.0)
 
     def create_timer(
         self, timer_period_sec: float, callback: Callable[..., Any], *arguments: Any, **named: Any
@@ -273,6 +287,7 @@ class PolledNode(Node):
             self._is_closed = True
             with self._callbacks_lock, self.guarded("close"):
                 self.close()
+            self.answer_the_rest(self.services)
 
     def destroy_node(self) -> None:
         """Close the node and remove it from the graph."""
@@ -365,18 +380,32 @@ class PacedNode(PolledNode):
 
 
 @types.coroutine
-def _stepwise(
-    work: Coroutine[Any, Any, Any], lock: contextlib.AbstractContextManager[Any]
-) -> Generator[Any, Any, Any]:
-    """Run a coroutine under a lock that is released while it awaits something."""
-    told = None
+def _stepwise(work: Coroutine[Any, Any, Any], lock: threading.RLock) -> Generator[Any, Any, Any]:
+    """Run a coroutine under a lock that is released while it awaits something.
+
+    While another thread has the lock, it awaits that too, so that this thread can end its task.
+    """
+    awaited = told = None
     while True:
-        with lock:
+        if lock.acquire(blocking=False):
             try:
                 awaited = work.send(told)
             except StopIteration as end:
                 return end.value
+            finally:
+                lock.release()
         told = yield awaited
+
+
+def drop_late_answers(service: Service) -> None:
+    """Drop the answers that cannot be sent: the service, rclpy or the client has ended."""
+    send = service.send_response
+
+    def send_response(response: Any, header: Any) -> None:
+        with contextlib.suppress(RuntimeError):  # InvalidHandle, or RCLError, which is not public
+            send(response, header)
+
+    service.send_response = send_response  # rclpy would end its executor
 
 
 class TurnExecutor(SingleThreadedExecutor):
@@ -390,7 +419,8 @@ class TurnExecutor(SingleThreadedExecutor):
 
     def __init__(self, *arguments: Any, **named: Any) -> None:
         super().__init__(*arguments, **named)
-        self._answers: list[Task] = []
+        self.answers: dict[Task, Service] = {}
+        """The tasks that answer a request, each with its service."""
 
     def turn(self) -> bool:
         """Run the ready callbacks; return whether a service has a new or unanswered request."""
@@ -399,8 +429,8 @@ class TurnExecutor(SingleThreadedExecutor):
         while True:
             asked = self._take_requests()
             self._run_ready()
-            self._answers = [one for one in self._answers if not one.done()]
-            is_lively |= asked or bool(self._answers)
+            self.answers = {task: of for task, of in self.answers.items() if not task.done()}
+            is_lively |= asked or bool(self.answers)
             # A service may have more requests after its answer, but the streams must have a turn.
             if not asked or time.monotonic() > until:
                 return is_lively
@@ -408,19 +438,19 @@ class TurnExecutor(SingleThreadedExecutor):
     def answer(self) -> None:
         """Answer requests to services; timers wait for the next turn."""
         self._take_requests()
-        for task in self._answers:
+        for task in self.answers:
             task()
 
     def _take_requests(self) -> bool:
         """Start to answer the new requests; return whether there are any."""
-        before = len(self._answers)
+        before = len(self.answers)
         for node in self.get_nodes():
             for service in node.services:
                 is_mine = isinstance(service.callback_group, _TakenInTurns)
                 # One request at a time, because rclpy runs the newest of its tasks first.
                 if is_mine and takes_directly(service) and (found := take_request(service)):
-                    self._answers.append(self.create_task(_answer, node, service, *found))
-        return len(self._answers) > before
+                    self.answers[self.create_task(_answer, node, service, *found)] = service
+        return len(self.answers) > before
 
     def _run_ready(self) -> None:
         has_run = False
@@ -449,18 +479,27 @@ async def _answer(node: Node, service: Service, request: object, header: object)
         service.send_response(response, header)
 
 
+def lack_of_time(node: Node) -> str:
+    """Return the problem of a node whose simulated time has not started, or ''."""
+    clock = node.get_clock()
+    if not clock.ros_time_is_active or clock.now().nanoseconds:
+        return ""
+    return "no time on /clock although use_sim_time is set: publish a clock, or unset use_sim_time"
+
+
 def create_service(
     node: PolledNode,
     name: str,
     work: Callable[..., Awaitable[str]],
     failure: str = "",
     kind: type = Trigger,
+    is_dated: bool = False,
 ) -> None:
     """Create a std_srvs/Trigger service, or a SetBool service whose value `work` receives.
 
     The coroutine `work` returns the message of a success, or raises RefusalError with the reason;
     any other exception is answered as an internal error. If `failure` is given, a refusal is logged
-    after this text.
+    after this text. Work whose result `is_dated` is refused until simulated time has started.
     """
 
     async def answer(request: Any, response: Any) -> Any:
@@ -470,6 +509,8 @@ def create_service(
                     f"{node.get_fully_qualified_name()} is inactive: activate it, for example "
                     f"with `ros2 lifecycle set {node.get_fully_qualified_name()} activate`"
                 )
+            if is_dated and (problem := lack_of_time(node)):
+                raise RefusalError(problem)
             with bugs_reported(node):
                 response.message = await (work() if kind is Trigger else work(request.data))
             response.success = True

@@ -21,6 +21,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.service import Service
 from rclpy.subscription import Subscription
+from rclpy.task import Task
 
 CHECKED = ("7.1.6", "9.1.2")
 """Versions of rclpy with which the tests have run, of Jazzy and of Kilted."""
@@ -55,6 +56,11 @@ def take_request(service: Service) -> tuple[Any, Any] | None:
     with service.handle:
         request, header = service.handle.service_take_request(service.srv_type.Request)
     return None if header is None else (request, header)
+
+
+def tasks_of(executor: Executor | None) -> list[tuple[Task, object]]:
+    """Return the tasks of an executor, each with what it runs for; none if they are hidden."""
+    return [(task, entity) for task, entity, _ in getattr(executor, "_tasks", ())]
 
 
 def awaits_coroutines(executor: Executor | None) -> bool:
