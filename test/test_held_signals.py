@@ -16,6 +16,7 @@ from valve_friction_ros.held_signals import (
     archive_dead_band,
     as_archived,
     as_sent_on_change,
+    sent_dead_band,
     without_repeats,
 )
 from valve_friction_ros.model.recording import StampedSignal
@@ -103,6 +104,20 @@ class TestSentOnChange:
         kept = np.array([k for k in range(1000) if k % 10 and not 300 < k < 350])
         signal = StampedSignal(0.01 * kept, 1e-4 * kept)
         assert as_sent_on_change(signal) is signal
+
+    @pytest.mark.parametrize("band", [0.002, 0.01, 0.03])
+    def test_its_dead_band_is_the_least_change(self, band):
+        """A wave with rests, of amplitude 1, sent when it has left the band; noise is a tenth."""
+        time = np.arange(20_000) * PERIOD
+        wave = np.clip(np.sin(1.7 * time) + 0.6 * np.sin(4.3 * time), -1.0, 1.0)
+        values = wave + 0.1 * band * np.random.default_rng(4).standard_normal(time.size)
+        kept = [0]
+        for row in range(1, time.size):
+            if abs(values[row] - values[kept[-1]]) > band:
+                kept.append(row)
+        found = sent_dead_band(StampedSignal(time[kept], values[kept]))
+        assert band <= found < 1.1 * band
+        assert sent_dead_band(StampedSignal(time, values)) == 0.0
 
 
 def archived(signal):

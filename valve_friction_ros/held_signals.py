@@ -127,6 +127,26 @@ _JUMP = 2.0
 """Dead bands beyond which a change after a pause is a jump: slower ones are sent as they occur."""
 
 
+def sent_dead_band(signal: StampedSignal) -> float:
+    """Estimate the dead band of a source that sends on change, in the signal's unit; else 0.
+
+    It is the least change that is sent.
+    """
+    pauses, steps = np.diff(signal.time), np.abs(np.diff(signal.value))
+    usual = float(np.median(pauses))
+    if steps.size < _FEWEST_CHANGES or pauses.max() < _IRREGULAR_GAP * usual:
+        return 0.0
+    soon = steps[pauses < 0.5 * pauses.max()]
+    least = float(np.quantile(soon, 0.05))
+    is_regular = np.mean(pauses < 1.5 * _shortest(pauses)) > _REGULAR_SHARE
+    return 0.0 if is_regular or least < _EVEN_STEP * float(np.median(steps)) else least
+
+
+def _shortest(pauses: NDArray[np.float64]) -> float:
+    """Return the shortest usual pause between two values that are sent on change."""
+    return float(np.quantile(pauses, _FEW_SHORTER))
+
+
 def as_sent_on_change(signal: StampedSignal) -> StampedSignal:
     """Hold each value of a signal that is sent on change until just before the next jump.
 
@@ -134,16 +154,11 @@ def as_sent_on_change(signal: StampedSignal) -> StampedSignal:
     pause would move a stem that sticks while the force on it grows. Other signals are returned
     unchanged.
     """
+    least = sent_dead_band(signal)
+    if least == 0.0:
+        return signal
     pauses, steps = np.diff(signal.time), np.abs(np.diff(signal.value))
-    usual = float(np.median(pauses))
-    if steps.size < _FEWEST_CHANGES or pauses.max() < _IRREGULAR_GAP * usual:
-        return signal
-    shortest = float(np.quantile(pauses, _FEW_SHORTER))
-    soon = steps[pauses < 0.5 * pauses.max()]
-    least = float(np.quantile(soon, 0.05))
-    is_regular = np.mean(pauses < 1.5 * shortest) > _REGULAR_SHARE
-    if is_regular or least < _EVEN_STEP * float(np.median(steps)):
-        return signal
+    shortest = _shortest(pauses)
     jumps = np.flatnonzero((steps > _JUMP * least) & (pauses > 2.0 * shortest)) + 1
     return StampedSignal(
         np.insert(signal.time, jumps, signal.time[jumps] - shortest),

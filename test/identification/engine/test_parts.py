@@ -11,6 +11,7 @@
 
 import math
 import re
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -21,9 +22,9 @@ from valve_friction_ros.identification.engine.broad_model import ABSENT, SWINGIN
 from valve_friction_ros.identification.engine.coordinates import TIMING, Profile
 from valve_friction_ros.identification.engine.fitted_record import fitted_record, inflation
 from valve_friction_ros.identification.engine.intervals import (
-    ARCHIVE,
     AT_REST,
     AVERAGES,
+    OMITTED,
     ROUNDING,
     STROKES,
     UNSEEN,
@@ -53,6 +54,7 @@ from valve_friction_ros.identification.engine.verdicts import (
     found_imperfections,
     main_doubt,
     sampling_remarks,
+    split_doubt,
 )
 from valve_friction_ros.identification.result import Pause, StemComparison
 from valve_friction_ros.identification.trust.verdict import interval_share
@@ -368,7 +370,7 @@ def test_lags_that_compensate_each_other_are_not_named(clock, pressure, said):
 
 def test_every_source_has_words():
     """Also those that are no imperfection of a plant."""
-    of_record = (ROUNDING, ARCHIVE, UNSEEN, STROKES, AVERAGES, AT_REST)
+    of_record = (ROUNDING, OMITTED, UNSEEN, STROKES, AVERAGES, AT_REST)
     for name in (*ABSENT, "start_position", *of_record):
         doubt = main_doubt(Estimated(1.0, 0.2, 1.0, 0.0, {name: 2.0}), interval_share(1.0, 0.2))
         assert doubt.startswith(
@@ -391,6 +393,24 @@ def ended(misfit, penalty, inflation, low_speed=(0.0, 1.0)):
         at={"at_low_speed": value},
         deviation=lambda _: deviation,
     )
+
+
+@pytest.mark.parametrize(
+    ("inflation", "penalty", "lag", "said"),
+    [
+        (1.0, 5.0, 0.01, ""),
+        (2.0, 5.0, 0.01, "no friction model here"),
+        (1.0, 27.0, 0.01, "the best fit needs imperfections that are improbable together"),
+        (1.0, 5.0, 9.0, "the best fit puts the signals 9000 ms apart"),
+    ],
+)
+def test_what_keeps_a_fit_from_determining_the_lag(inflation, penalty, lag, said):
+    best = replace(fit_at(lag, 100.0), inflation=inflation, penalty=penalty)
+    best = replace(best, names=("delay", "viscous_friction"))
+    misfit = SimpleNamespace(systematic=1e-5)
+    doubt = split_doubt([best, best], misfit, Profile.PLANT, 5.0)
+    assert doubt.startswith(said)
+    assert bool(doubt) == bool(said)
 
 
 class TestSearch:

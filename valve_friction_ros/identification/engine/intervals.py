@@ -195,10 +195,10 @@ _FAR = 0.5
 """Share of that work by which a fit may differ from it before it is doubted, however well it
 follows the stem: a lag alone explains less."""
 
-ROUNDING, ARCHIVE, UNSEEN = "rounding", "archive", "unseen"
+ROUNDING, OMITTED, UNSEEN = "rounding", "omitted", "unseen"
 STROKES, AVERAGES, AT_REST = "strokes", "averages", "at_rest"
 """Sources of the uncertainty of a number: the step of the converter of the force, the dead band of
-a historian, what happens between two of its samples, strokes that differ, averaging times that
+a historian or a sensor, what happens between two samples, strokes that differ, averaging times that
 differ or are too few to tell, and friction at rest in place of that of the moves."""
 
 _FINEST = {SLIDING: FINEST_SLIDING, "spring_constant": 2e-4}

@@ -22,6 +22,7 @@ from valve_friction_ros.held_signals import (
     archive_dead_band,
     as_archived,
     as_sent_on_change,
+    sent_dead_band,
     without_repeats,
 )
 from valve_friction_ros.identification.drawing import FRICTION_CURVE, IMPERFECTIONS_FOUND
@@ -39,8 +40,8 @@ from valve_friction_ros.identification.engine.friction_curve import (
     timed_numbers,
 )
 from valve_friction_ros.identification.engine.intervals import (
-    ARCHIVE,
     ASYMMETRY,
+    OMITTED,
     UNSEEN,
     Estimated,
     NumbersAt,
@@ -188,7 +189,7 @@ def _identified(
         force = float(np.ptp(valve.force_per_drive * record.drive.value))
         outcome = _of_force_balance(curves, balanced, settings, str(refusal), force)
     outcome = _as_sampled(_with_departures(outcome, departed), record, lag, curves, levels)
-    outcome = _as_stored(outcome, record, valve, lag)
+    outcome = _as_stored(outcome, recording.stamped or record, record, valve, lag)
     published, beside = published_beside(uniform, valve, settings)
     misfit = outcome.misfit
     return Result(
@@ -429,22 +430,27 @@ Calibrated on 240 simulated records of historians, scanned every 0.5 to 5 s; che
 """
 
 
-def _as_stored(outcome: _Outcome, record: StampedRecord, valve: Valve, lag: LagPrior) -> _Outcome:
-    """Widen the friction by what a historian has not stored of the force and of the spring.
+def _as_stored(
+    outcome: _Outcome, sent: StampedRecord, record: StampedRecord, valve: Valve, lag: LagPrior
+) -> _Outcome:
+    """Widen the friction by what was not sent, or not stored, of the force and of the spring.
 
     A held value is behind the signal by up to a dead band, on the same side throughout a move, so
     no averaging removes that. Nor does it show what happened between two samples, unless the timing
     of slow signals is stated.
     """
-    force = valve.force_per_drive * archive_dead_band(record.drive)
+    drive, position = (
+        max(archive_dead_band(held), sent_dead_band(raw))
+        for held, raw in ((record.drive, sent.drive), (record.position, sent.position))
+    )
     spring = outcome.parameters["spring_constant"].value
     if math.isnan(spring):
         spring = valve.force_per_drive * np.ptp(record.drive.value) / np.ptp(record.position.value)
-    banded = math.hypot(force, spring * archive_dead_band(record.position)) / math.sqrt(12.0)
+    banded = math.hypot(valve.force_per_drive * drive, spring * position) / math.sqrt(12.0)
     unseen = 0.0
     if _interval(record) > _SCAN and lag.deviation is None:
         unseen = _UNSEEN * abs(outcome.numbers[SLIDING].value) / NORMAL_QUANTILE
-    hidden = {ARCHIVE: banded, UNSEEN: unseen}
+    hidden = {OMITTED: banded, UNSEEN: unseen}
     if not any(hidden.values()):
         return outcome
     total = math.hypot(*hidden.values())
@@ -464,7 +470,9 @@ def _as_stored(outcome: _Outcome, record: StampedRecord, valve: Valve, lag: LagP
         )
         if math.isfinite(known.value):
             width = math.hypot(known.half_width, NORMAL_QUANTILE * total)
-            parameters[name] = verdicts.judged(name, wider, width, known.reason)
+            by_width = verdicts.judged(name, one, known.half_width).reason
+            reason = "" if known.reason == by_width else known.reason
+            parameters[name] = verdicts.judged(name, wider, width, reason)
     return outcome._replace(parameters=parameters, numbers=numbers)
 
 

@@ -20,13 +20,14 @@ from valve_friction_ros.held_signals import SLOW_SAMPLING, without_repeats
 from valve_friction_ros.identification.engine.coordinates import IMPERFECTIONS, TIMING, Profile
 from valve_friction_ros.identification.engine.friction_curve import FrictionCurve
 from valve_friction_ros.identification.engine.intervals import (
-    ARCHIVE,
     AT_REST,
     AVERAGES,
     NOISE_LIKE,
     NOT_QUITE,
+    OMITTED,
     ROUNDING,
     STROKES,
+    UNLIKELY,
     UNSEEN,
     Estimated,
 )
@@ -61,7 +62,7 @@ The slip force cannot be negative, so that noise alone makes it positive."""
 _OTHERS = {
     "start_position": "initial stem position",
     ROUNDING: "force within one step of the converter",
-    ARCHIVE: "changes within the dead band of the historian",
+    OMITTED: "changes too small for the source to send or to store",
     UNSEEN: "what happens between two samples",
     STROKES: "why the strokes differ",
     AVERAGES: "what averages over other times would show",
@@ -494,15 +495,21 @@ def split_doubt(
 ) -> str:
     """Return why the simulated stem determines no more than the force balance does, if so.
 
-    The residual of a plant exceeds noise, the lag is impossible, or the search could not trade
-    viscous friction for lag while both are unknown.
+    The residual of a plant exceeds noise, its imperfections are improbable, the lag is impossible,
+    or the search could not trade viscous friction for lag while both are unknown.
     """
     best = fits[0]
-    if best.inflation > NOT_QUITE and profile.has_imperfections:
+    is_plant = profile.has_imperfections
+    if best.inflation > NOT_QUITE and is_plant:
         return (
             f"no friction model here reproduces the motion exactly ("
             f"{two_digits(1e6 * misfit.systematic)} µm of the deviation is more than noise): the "
             "sliding friction is reliable, its components are not"
+        )
+    if best.penalty > UNLIKELY and is_plant:
+        return (
+            "the best fit needs imperfections that are improbable together: something else in the "
+            "motion looks like them"
         )
     if abs(best.lag) >= reach:
         return (
