@@ -198,8 +198,9 @@ class HartDevice:
         self._thread.start()
 
     def _serve_datagrams(self):
-        while (one := self._socket.recvfrom(1024))[0]:
-            self._socket.sendto(self._reply(one[0]), one[1])
+        with contextlib.suppress(OSError):  # closed
+            while (one := self._socket.recvfrom(1024))[0]:
+                self._socket.sendto(self._reply(one[0]), one[1])
 
     def _serve_connections(self):
         with contextlib.suppress(OSError):  # closed
