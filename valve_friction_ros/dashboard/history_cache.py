@@ -48,7 +48,7 @@ from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.streams import DAY, END_OF_TIME
 
 if TYPE_CHECKING:
-    from valve_friction_ros.history import HistoryMark, KeptRatio
+    from valve_friction_ros.history import HistoryMark
 
 
 _SPARK_POINTS = 40
@@ -273,7 +273,7 @@ class HistoryCache:
             return self._histories[node]
 
 
-def _status_of(kept: ValveHistory) -> Status:
+def status_of(kept: ValveHistory) -> Status:
     """Return the status of a valve as its identifier would publish it, without alarms.
 
     The numbers come from the last successful identification, the comparison from the last baseline.
@@ -350,7 +350,7 @@ class KeptValves(HistoryCache):
             try:
                 if valve not in self._statuses:
                     found = database.valve_histories(self._history, (valve,), 0, END_OF_TIME)
-                    self._statuses[valve] = [_status_of(one) for one in found]
+                    self._statuses[valve] = [status_of(one) for one in found]
                 alarms = database.read_alarms(self._history, valve.name)
                 statuses = [_with_alarms(one, alarms) for one in self._statuses[valve]]
             except (ValueError, TypeError, KeyError) as error:
