@@ -266,7 +266,7 @@ class Code(Enum):
         "packing life: {used:.0f} of {limit:.6g} reversals (reversal_limit){state}: replace the "
         "packing, then call ~/reset_usage"
     )
-    LIMIT_REACHED = ": reached"
+    LIMIT_REACHED = ", limit reached"
     LIMIT_EXPECTED = ", expected on {expected:day}"
     LIMIT_NEAR = ", close to its limit (previously warned)"
     # Why a stroke test that is played returns to its start
