@@ -340,7 +340,7 @@ class TestLimits:
         assert state.is_reached
         assert state.warns
         assert state.expected is None
-        assert "10 of 10 reversals (reversal_limit): reached: replace" in state.message
+        assert "10 of 10 reversals (reversal_limit), limit reached: replace" in state.message
 
     @pytest.mark.parametrize("pace", [None, Pace(0.0, 0.0), Pace(1e-9, 0.0)])
     def test_no_date(self, pace):

@@ -191,10 +191,10 @@ class Code(Enum):
     CLEARED_AS_SETTINGS = "valve or window parameters were changed"
     CLEARED_AS_RECORD_BEGINS = "a new record begins"
     CLEARED_AS_STAMPS_GO_BACK = "time stamps go backwards: the buffer is cleared"
-    STAMPS_WENT_BACK = "the time stamps of {signal} jumped back by {seconds:.3g} s"
+    STAMPS_WENT_BACK = "the time stamps of {signal} jumped back by {seconds:lasting}"
     TIME_JUMPED = (
-        "the time on /clock jumped back by {seconds:.3g} s; if a bag is played in a loop, identify "
-        "shortly before it begins again"
+        "the time on /clock jumped back by {seconds:lasting}; if a bag is played in a loop, "
+        "identify shortly before it begins again"
     )
     CLOCK_CHANGED = "use_sim_time was changed"
     TIME_JUMPS = "the time on /clock jumps back"
@@ -215,11 +215,11 @@ class Code(Enum):
         "for example {reading:.4g} m: check unit (m), zero and travel{question:after : }"
     )
     STAMPS_APART = (
-        "stem_state is stamped {seconds:.3g} s {is_ahead:?later|earlier} than actuator_pressure: "
+        "stem_state is stamped {seconds:lasting} {is_ahead:?later|earlier} than actuator_pressure: "
         "synchronise the clocks of both sensors, and check for transmission delays"
     )
     STAMPS_OFF_CLOCK = (
-        "the time stamps of {signal:or both inputs} are {seconds:.3g} s {is_ahead:?ahead "
+        "the time stamps of {signal:or both inputs} are {seconds:lasting} {is_ahead:?ahead "
         "of|behind} the clock of this node: synchronise the clocks; for a recording, set "
         "use_sim_time and play it with --clock, or set clock_tolerance to 0"
     )
@@ -269,7 +269,7 @@ class Code(Enum):
         "packing life: {used:.0f} of {limit:.6g} reversals (reversal_limit){state}: replace the "
         "packing, then call ~/reset_usage"
     )
-    LIMIT_REACHED = ": reached"
+    LIMIT_REACHED = ", limit reached"
     LIMIT_EXPECTED = ", expected on {expected:day}"
     LIMIT_NEAR = ", close to its limit (previously warned)"
     # Why a stroke test that is played returns to its start
@@ -395,6 +395,13 @@ def two_digits(value: float) -> str:
 def three_digits(value: float) -> str:
     """Write a number with three significant digits, or as an integer from 1000 on; no exponent."""
     return f"{value:.3g}" if abs(value) < 999.5 else f"{value:.0f}"
+
+
+def without_exponent(number: str) -> str:
+    """Write a formatted number below 1e9 without an exponent: 3.1e+04 becomes 31000."""
+    if "e+" not in number or abs(float(number)) >= 1e9:
+        return number
+    return f"{float(number):{'+' if number.startswith('+') else ''}.0f}"
 
 
 _UNITS_OF_TIME = (("days", 86400), ("h", 3600), ("min", 60))
@@ -585,7 +592,7 @@ _SIZES = {"%": 1e2, "mm": 1e3, "ms": 1e3, "mm/s": 1e3}
 
 def _difference(change: tuple[float, float, float], unit: str) -> str:
     size, digits = _SIZES.get(unit, 1.0), ".2f" if unit == "mm" else ".3g"
-    value, low, high = (f"{size * one:+{digits}}" for one in change)
+    value, low, high = (without_exponent(f"{size * one:+{digits}}") for one in change)
     return f"{' '.join(filter(None, (value, unit)))} ({low} to {high})"
 
 
@@ -618,6 +625,7 @@ _FORMATS: dict[str, Callable[[Any, str], str]] = {
     "drive": lambda name, _: Drive[name].words,
     "figures": lambda ratio, _: _ratio(ratio, ".2f"),
     "headline": lambda one, _: headline(one),
+    "lasting": lambda seconds, _: lasting(seconds),
     "dated": lambda time, _: "" if time is None else f" (identified {utc_minute(time)})",
     "in": _in_unit,
     "misfit": lambda one, _: misfit_words(*one),
@@ -656,7 +664,8 @@ class _Writer(string.Formatter):
             return yes if value else no
         if (form := _FORMATS.get(name)) is not None:
             return form(value, details)
-        return "" if value is None else format(value, format_spec)
+        told = "" if value is None else format(value, format_spec)
+        return without_exponent(told) if format_spec.endswith("g") else told
 
 
 _WRITER = _Writer()

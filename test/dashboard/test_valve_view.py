@@ -85,6 +85,16 @@ def test_changes_since_the_baseline_are_rounded_to_their_intervals():
     assert [one.name for one in shown["usage"]] == ["reversals"]
 
 
+def test_long_times_and_large_numbers_have_no_exponent():
+    times = {"time_watched [s]": "86400.25", "time_near_seat [s]": "599.5"}
+    shown = view(**times, **{"travelled_distance [m]": "123456.5"}).groups()["usage"]
+    assert {one.name: " ".join(one[1:]) for one in shown} == {
+        "time watched": "24 h",
+        "time near seat": "599.5 s",
+        "travelled distance": "123500 m",
+    }
+
+
 @pytest.mark.parametrize(
     ("of", "name", "value", "healthy"),
     [

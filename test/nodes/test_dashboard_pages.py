@@ -18,6 +18,7 @@ from urllib.parse import parse_qs, quote, urlsplit
 
 import pytest
 from browser import Tab, axe_violations, chromium
+from histories import success
 from live_nodes import NAMESPACE, NODE, SECOND, START, buffered
 from local_server import free_port
 from records import quick_record
@@ -516,6 +517,21 @@ def test_an_alarm_of_a_valve_without_alarm_services_is_answered(plant, tab):
     row.get_by_text(until).wait_for()
     row.get_by_role("button", name="More").click()
     page.locator(".vf-dialog-title").get_by_text(until).wait_for()
+
+
+def test_of_a_valve_only_in_the_history_its_last_state_and_first_what_waits(plant, tab):
+    valve, now = KeptValve("/past/fv_1/identifier", "PAST-1"), time.time_ns()
+    plant.history.add(success(valve=valve))
+    found = {AlarmKind.STUCK: EXCESS, AlarmKind.FRICTION_HIGH: EXCESS}
+    follow_alarms(plant.history, valve, found, now - SECOND)
+    shelve = AlarmRequest(AlarmAction.SHELVE, "B", duration=3600.0)
+    request_many(plant.history, [(valve, AlarmKind.FRICTION_HIGH)], shelve, now)
+    page = tab.open(f"/valve?node={quote(valve.name)}")
+    page.locator(".vf-parameters").get_by_text("Coulomb friction").wait_for()
+    page.get_by_text("Last in the history: friction normal").wait_for()
+    page = tab.open("/alarms?area=/past")
+    page.locator("tbody tr:first-child").get_by_text("stuck").wait_for()
+    page.locator("tbody tr:last-child").get_by_text("friction high").wait_for()
 
 
 def test_what_cannot_be_called_says_so(tab):

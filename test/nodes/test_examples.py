@@ -178,32 +178,47 @@ def nothing():
 
 
 class HartDevice:
-    """A device of HART-IP 1 by UDP, byte by byte after TP10300 and the universal commands.
+    """A device of HART-IP 1, byte by byte after TP10300 and the universal commands.
 
     `values()` returns position, pressure and the device status at each command 3.
     """
 
-    def __init__(self, values, port=0):
+    def __init__(self, values, protocol, port=0):
         self._values = values
         self.asked = []
-        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        kind = socket.SOCK_DGRAM if protocol == "udp" else socket.SOCK_STREAM
+        self._socket = self._line = socket.socket(socket.AF_INET, kind)
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         self._socket.bind(("127.0.0.1", port))
         self.port = self._socket.getsockname()[1]
-        self._thread = threading.Thread(target=self._serve, daemon=True)
+        if protocol == "tcp":
+            self._socket.listen()
+        serve = self._serve_datagrams if protocol == "udp" else self._serve_connections
+        self._thread = threading.Thread(target=serve, daemon=True)
         self._thread.start()
 
-    def _serve(self):
-        while True:
-            request, sender = self._socket.recvfrom(1024)
-            if not request:
-                return
-            version, _, what, _, sequence, length = struct.unpack(">BBBBHH", request[:8])
-            assert length == len(request)
-            body = request[8:]
-            if what == 3:
-                body = self._answer(body)
-            header = struct.pack(">BBBBHH", version, 1, what, 0, sequence, 8 + len(body))
-            self._socket.sendto(header + body, sender)
+    def _serve_datagrams(self):
+        with contextlib.suppress(OSError):  # closed
+            while (one := self._socket.recvfrom(1024))[0]:
+                self._socket.sendto(self._reply(one[0]), one[1])
+
+    def _serve_connections(self):
+        with contextlib.suppress(OSError):  # closed
+            while True:
+                self._line = self._socket.accept()[0]
+                with self._line as line:
+                    while head := line.recv(8, socket.MSG_WAITALL):
+                        length = struct.unpack(">H", head[6:])[0] - 8
+                        body = line.recv(length, socket.MSG_WAITALL) if length else b""
+                        line.sendall(self._reply(head + body))
+
+    def _reply(self, request):
+        version, _, what, _, sequence, length = struct.unpack(">BBBBHH", request[:8])
+        assert length == len(request)
+        body = request[8:]
+        if what == 3:
+            body = self._answer(body)
+        return struct.pack(">BBBBHH", version, 1, what, 0, sequence, 8 + len(body)) + body
 
     def _answer(self, frame):
         """Answer a frame of a token-passing HART link: delimiter, address, command, data."""
@@ -224,28 +239,31 @@ class HartDevice:
         return answer + bytes((reduce(int.__xor__, answer),))
 
     def close(self):
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as end:
-            end.sendto(b"", ("127.0.0.1", self.port))
+        for one in (self._line, self._socket):
+            with contextlib.suppress(OSError):  # of datagrams: the thread ends all the same
+                one.shutdown(socket.SHUT_RDWR)
         self._thread.join(10.0)
         self._socket.close()
 
 
 @needs("hartip")
 @pytest.mark.slow
-def test_each_answer_of_hart_is_one_sample_and_a_lost_device_is_found_again(live):
+@pytest.mark.parametrize("protocol", ["udp", "tcp"])
+def test_each_answer_of_hart_is_one_sample_and_a_lost_device_is_found_again(live, protocol):
     """Of four answers one has no pressure, and one is of a device that says it is defective."""
     said = [(20.0, 1.5, 0), (30.0, math.nan, 0), (40.0, 1.25, 0), (50.0, 2.0, 0x80)]
     turn = iter(range(10**9))
     heard = Heard(live.client)
-    device = HartDevice(lambda: said[next(turn) % 4])
-    given = {"host": "127.0.0.1", "port": device.port, "address": ADDRESS, "rate": 50.0,
-             "longest": 0.5, "position_scale": -2e-4, "position_at_zero": 0.02}  # fmt: skip
+    device = HartDevice(lambda: said[next(turn) % 4], protocol)
+    given = {"host": "127.0.0.1", "port": device.port, "protocol": protocol, "address": ADDRESS,
+             "rate": 50.0, "longest": 0.5,
+             "position_scale": -2e-4, "position_at_zero": 0.02}  # fmt: skip
     gateway = live.start("hart_ip_gateway", given, script=EXAMPLES / "hart_ip_gateway.py")
     live.client.wait_until(lambda: len(heard.places) > 10, "samples")
     device.close()
     live.client.wait_until(lambda: "is lost, tried again" in gateway.errors, "the complaint")
     count = len(heard.places)
-    device = HartDevice(lambda: said[next(turn) % 4], device.port)
+    device = HartDevice(lambda: said[next(turn) % 4], protocol, device.port)
     live.client.wait_until(lambda: len(heard.places) > count + 10, "samples again")
     live.client.wait_until(lambda: len(heard.places) == len(heard.pressures), "both signals")
     assert device.asked[0] == (0, bytes((0x80 | ADDRESS,)))

@@ -91,7 +91,7 @@ BAD = {  # what arrives, the fault that it is, and words of its sentence
     "pressure too high": (
         {"pressure": 9e5},
         DataFault(REJECTED, Signal.PRESSURE, SampleFault.OUT_OF_RANGE),
-        ("9e+05 Pa is outside the sensor's range", "pressure_maximum"),
+        ("900000 Pa is outside the sensor's range", "pressure_maximum"),
     ),
     "nan position": (
         {"position": math.nan},
@@ -120,8 +120,12 @@ BAD = {  # what arrives, the fault that it is, and words of its sentence
     ),
     "late": ({"late": 5.0}, DataFault(SKEW), ("stamped 5 s later", "synchronise")),
     "early": ({"late": -5.0}, DataFault(SKEW), ("stamped 5 s earlier", "synchronise")),
-    "ahead": ({"off": 3e8}, DataFault(CLOCK), ("of both inputs are 3e+08 s ahead", "synchronise")),
-    "behind": ({"off": -3e8}, DataFault(CLOCK), ("inputs are 3e+08 s behind", "use_sim_time")),
+    "ahead": (
+        {"off": 3e8},
+        DataFault(CLOCK),
+        ("both inputs are 3472 days ahead", "synchronise"),
+    ),
+    "behind": ({"off": -3e8}, DataFault(CLOCK), ("inputs are 3472 days behind", "use_sim_time")),
 }
 
 

@@ -288,18 +288,19 @@ def _trend_lines(trend: Trend, zone: ZoneInfo) -> list[Options]:
 
 
 def _marks(history: ValveHistory, zone: ZoneInfo, now: int) -> Options:
-    label = {"show": True, "color": _GREY, "fontSize": 12, "position": "insideEndTop"}
-    marks = [("today", now, "solid")]
-    marks += [("baseline set", one.time, "dotted") for one in history.baselines[-3:]]
+    label = {"show": True, "color": _GREY, "fontSize": 12}
+    marks = [("today", now, "solid", "insideEndBottom")]  # beside, not on, a baseline of today
+    top = "insideEndTop"
+    marks += [("baseline set", one.time, "dotted", top) for one in history.baselines[-3:]]
     if renewed := history.usage.renewal:
-        marks.append(("packing renewed", renewed, "dashed"))
+        marks.append(("packing renewed", renewed, "dashed", top))
     return {
         "symbol": "none",
         "silent": True,
         "data": [
             {"xAxis": _wall(time, zone), "name": name,
-             "label": {**label, "formatter": name},
+             "label": {**label, "formatter": name, "position": place},
              "lineStyle": {"color": _GREY, "type": style}}
-            for name, time, style in marks
+            for name, time, style, place in marks
         ],
     }  # fmt: skip

@@ -48,7 +48,7 @@ from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.streams import DAY, END_OF_TIME
 
 if TYPE_CHECKING:
-    from valve_friction_ros.history import HistoryMark, KeptRatio
+    from valve_friction_ros.history import HistoryMark
 
 
 _SPARK_POINTS = 40
@@ -133,7 +133,7 @@ class HistoryCache:
         self._mark: HistoryMark | None = None
         self._row = 0
         self._number = 0
-        self._ratios: defaultdict[str, deque[KeptRatio]] = defaultdict(
+        self._ratios: defaultdict[str, deque[tuple[int, float]]] = defaultdict(
             lambda: deque(maxlen=_MOST_RATIOS)
         )
         self._sparks: dict[str, Sparkline | None] = {}
@@ -186,14 +186,13 @@ class HistoryCache:
             self.problem, self._mark = None, mark
             found = tuple(one for one in found if one.row not in self._rows)
             for one in found:
-                self._ratios[one.valve].append(one)
+                self._ratios[one.valve].append((one.time, one.ratio))
             self._rows.update(one.row for one in found)
             if mark.settled:  # no new row can precede the last one
                 self._row = max(self._row, mark.identification)
                 self._rows = {row for row in self._rows if row > self._row}
             for valve in {one.valve for one in found}:
-                ratios = list(self._ratios[valve])
-                self._sparks[valve] = sparkline([r.time for r in ratios], [r.ratio for r in ratios])
+                self._sparks[valve] = sparkline(*zip(*self._ratios[valve], strict=True))
             self._histories.clear()
             self.valves = valves  # last: other threads must find the rest complete
             self.revision += 1
@@ -274,7 +273,7 @@ class HistoryCache:
             return self._histories[node]
 
 
-def _status_of(kept: ValveHistory) -> Status:
+def status_of(kept: ValveHistory) -> Status:
     """Return the status of a valve as its identifier would publish it, without alarms.
 
     The numbers come from the last successful identification, the comparison from the last baseline.
@@ -351,7 +350,7 @@ class KeptValves(HistoryCache):
             try:
                 if valve not in self._statuses:
                     found = database.valve_histories(self._history, (valve,), 0, END_OF_TIME)
-                    self._statuses[valve] = [_status_of(one) for one in found]
+                    self._statuses[valve] = [status_of(one) for one in found]
                 alarms = database.read_alarms(self._history, valve.name)
                 statuses = [_with_alarms(one, alarms) for one in self._statuses[valve]]
             except (ValueError, TypeError, KeyError) as error:

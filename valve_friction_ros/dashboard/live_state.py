@@ -25,10 +25,12 @@ from valve_friction_ros.health.comparison import Ratio
 from valve_friction_ros.health.levels import Level, StatusSignal
 from valve_friction_ros.outside_text import printable
 from valve_friction_ros.records.bags.topics import StreamNames
-from valve_friction_ros.wording import name_in_words, number_and_width
+from valve_friction_ros.wording import lasting, name_in_words, number_and_width, without_exponent
 
 _KEY = re.compile(r"(?P<name>.*?)(?: \[(?P<unit>[^\]]*)\])?")
 _LONGEST_TEXT = 400
+_LONG = 600.0
+"""Time from which a larger unit than the second is used, s."""
 
 
 class Entry(NamedTuple):
@@ -97,8 +99,11 @@ def _entry(key: str, text: str) -> Entry:
     value = number(text)
     if math.isnan(value):
         shown = "–" if text == "nan" else printable(text, _LONGEST_TEXT)
+    elif unit == "s" and value >= _LONG:
+        shown, unit = lasting(value).split(" ")
     else:
-        shown = f"{value:.0f}" if abs(value) < 1e9 and value == round(value) else f"{value:.4g}"
+        is_whole = abs(value) < 1e9 and value == round(value)
+        shown = f"{value:.0f}" if is_whole else without_exponent(f"{value:.4g}")
     unit = "" if unit in ("date", "time", "1") else unit
     return Entry(printable(name_in_words(name), _LONGEST_TEXT), shown, printable(unit, 40))
 

@@ -143,6 +143,12 @@ class AlarmSelection:
         )
 
 
+def _urgency(one: KeptAlarmEvent) -> tuple[bool, bool]:
+    """Return a sort key: first what waits for acknowledgement, last what is suppressed."""
+    state = one.event.alarm.state
+    return state.is_suppressed, not state.needs_answer
+
+
 def _row(number: int, one: KeptAlarmEvent, zone: ZoneInfo, href: str, is_journal: bool) -> Any:
     """Return a row under fixed keys, with `number` as its identity."""
     event, alarm = one.event, one.event.alarm
@@ -313,6 +319,8 @@ class _AlarmPage:
             chosen = one.chosen(time.time_ns())
             found = await run.io_bound(history.alarms, chosen, one.is_journal, _MOST_ROWS + 1)
             events = found or ()  # None during shutdown
+            if not one.is_journal:
+                events = tuple(sorted(events, key=_urgency))
         except HistoryError as error:
             problem = str(error)
         self._shown, self._events = state, events[:_MOST_ROWS]

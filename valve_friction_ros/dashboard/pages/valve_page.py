@@ -11,13 +11,15 @@
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from typing import NamedTuple
 from urllib.parse import urlencode
 
 from nicegui import run, ui
 
 from valve_friction_ros.dashboard.context import Answer, DashboardContext, OfferedFile, ValveFiles
-from valve_friction_ros.dashboard.live_state import Heard, Quantity, ValveView
+from valve_friction_ros.dashboard.history_cache import status_of
+from valve_friction_ros.dashboard.live_state import Heard, Quantity, ValveView, view_of
 from valve_friction_ros.dashboard.live_strip import LiveStrip
 from valve_friction_ros.dashboard.pages.alarm_page import AlarmStates
 from valve_friction_ros.dashboard.pages.theme import (
@@ -310,6 +312,18 @@ class _ValveActions:
             self._answer.set_text(f"{_ACTIONS[service][1]} … {time.monotonic() - begin:.0f} s")
 
 
+def _view_of_history(kept: ValveHistory | None) -> ValveView | None:
+    """Return the last state of a valve in its history, and say that it is from there."""
+    if kept is None or not kept.entries:
+        return None
+    try:
+        view = view_of(kept.valve.name, status_of(kept))
+    except (ValueError, TypeError, KeyError):  # written by something else
+        return None
+    told = f"No message has been received from this valve. Last in the history: {view.sentence}"
+    return replace(view, sentence=told)
+
+
 _MOST_EVENTS = 500
 """Maximum number of alarm events in the trend, the newest."""
 _PERIOD = 0.2
@@ -340,6 +354,7 @@ class _ValvePage:
         self._revision = -1
         self._beat = 0
         self._history: ValveHistory | None = None
+        self._kept: ValveView | None = None
         self._kept_alarms: tuple[Alarm, ...] | None = None
         self._head = _ValveHead(page, context.is_live)
         signals = context.signals
@@ -351,7 +366,10 @@ class _ValvePage:
         return self._context.plant.valve(self._node, time.monotonic())
 
     def _view(self) -> ValveView:
+        """Return what the valve says; before its first message, what the history has of it."""
         heard = self._heard()
+        if self._kept is not None and (heard is None or heard.silent_for is None):
+            return self._kept
         return heard.view if heard is not None else ValveView(self._node, self._node)
 
     def draw(self) -> None:
@@ -446,6 +464,7 @@ class _ValvePage:
         self._revision = self._context.history.revision
         try:
             self._history = await run.io_bound(self._context.history.valve, self._node)
+            self._kept = _view_of_history(self._history)
             self._kept_alarms = await run.io_bound(self._context.history.valve_alarms, self._node)
             problem = self._context.history.problem
         except HistoryError as error:
