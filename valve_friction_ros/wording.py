@@ -420,7 +420,7 @@ def lasting(seconds: float) -> str:
 
 
 def number_and_width(value: float, half_width: float) -> tuple[str, str]:
-    """Write a number and half the width of its interval, to at most four digits."""
+    """Write a number and half the width of its interval to two digits of the latter."""
     if not math.isfinite(value):
         return "–", ""
     is_plain = value == 0 or 1e-4 <= abs(value) < 1e6
@@ -429,10 +429,15 @@ def number_and_width(value: float, half_width: float) -> tuple[str, str]:
         return _minus(digits), ""
     if not is_plain or not 1e-6 <= half_width < 1e6:
         return _minus(f"{value:.4g}"), f"± {half_width:.2g}"
-    of_width = 1 - math.floor(math.log10(half_width))
-    of_value = 3 - math.floor(math.log10(abs(value))) if value else 3
-    places = min(max(0, min(of_width, of_value)), 7)
-    return _minus(f"{value:.{places}f}"), f"± {half_width:.{max(0, min(of_width, 7))}f}"
+    of_width = min(1 - int(f"{half_width:.1e}".partition("e")[2]), 7)
+    of_value = max(3 - math.floor(math.log10(abs(value))), 0) if value else 3
+    places = min(of_width, of_value)
+    return _minus(_to_places(value, places)), f"± {_to_places(half_width, of_width)}"
+
+
+def _to_places(value: float, places: int) -> str:
+    """Round to decimal places, or, where they are negative, to tens, hundreds and so on."""
+    return f"{round(value, places):.{max(places, 0)}f}"
 
 
 def with_width(value: float, half_width: float) -> str:

@@ -217,6 +217,9 @@ def test_a_row_has_fixed_keys_only(plant):
         (-1.234e300, math.nan, ("−1.23e+300", "")),
         (12.0, 3e200, ("12", "± 3e+200")),
         (0.0, 0.5, ("0.00", "± 0.50")),
+        (9074.0, 6113.0, ("9100", "± 6100")),
+        (205_144.0, 951.0, ("205140", "± 950")),
+        (103.0, 9.96, ("103", "± 10")),
     ],
 )
 def test_numbers_have_the_digits_that_their_intervals_leave(value, half_width, texts):

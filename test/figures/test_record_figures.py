@@ -223,7 +223,7 @@ class TestVerdict:
         sliding, told = title_of(identification_figure(known)).split("; ", 1)
         assert sliding == "sliding friction 218.0 ± 0.65 N (identified)"
         assert told == (
-            "$F_c$ 152.7 ± 1.0 N (identified); $F_v$ 4865 ± 400 N·s/m (weak); $k$ 205000 N/m "
+            "$F_c$ 152.7 ± 1.0 N (identified); $F_v$ 4860 ± 400 N·s/m (weak); $k$ 205000 N/m "
             f"(fixed); dead band 5.2 % of travel; fit {100 * known.misfit.fit:.2f} %"
         )
 
