@@ -298,7 +298,7 @@ def test_simulated_time(live):
     response = client.refusal("identify")
     assert "no samples" in response
     assert re.search(
-        r"the buffer was cleared: the time on /clock jumped back by [678]\d(\.\d)? min; if a bag is "
-        r"played in a loop, identify shortly before it begins again",
+        r"the buffer was cleared: the time on /clock jumped back by [678]\d(\.\d)? min; if a bag "
+        r"is played in a loop, identify shortly before it begins again",
         response,
     )
