@@ -128,13 +128,13 @@ class Nonsense(Enum):
     WRONG_JOINT = "no position for the joint 'stem'"
     PRESSURE_NAN = "actuator_pressure: 100 % of its samples are rejected"
     POSITION_NAN = "stem_state: 100 % of its samples are rejected"
-    PRESSURE_ABOVE = "9e+05 Pa is outside the sensor's range"
-    PRESSURE_BELOW = "-1e+04 Pa is outside the sensor's range"
+    PRESSURE_ABOVE = "900000 Pa is outside the sensor's range"
+    PRESSURE_BELOW = "-10000 Pa is outside the sensor's range"
     STEM_IN_MM = "stem_state: 100 % of its samples lie outside the travel"
     STEM_ENDLESS = "1e+308 m is outside the range of any valve"
     STEM_LATE = "later than actuator_pressure"
-    CLOCK_AHEAD = "3e+08 s ahead of the clock"
-    CLOCK_BEHIND = "3e+08 s behind the clock"
+    CLOCK_AHEAD = "3472 days ahead of the clock"
+    CLOCK_BEHIND = "3472 days behind the clock"
     NO_STAMPS = "time stamps are repeated"
 
 
