@@ -39,13 +39,16 @@ LONG_PAUSE = 10
 
 Chosen: at 100 Hz or faster such a pause is 0.1 s at most, short against a stroke."""
 
+FEWEST_BUNCHES = 10
+"""Least pauses of about one length between samples in bunches. Chosen: outages differ in length."""
+
 _SCAN = 0.05
-_FEWEST_BUNCHES, _ALIKE = 10, 0.3
+_ALIKE = 0.3
 _USUAL, _STEPS = 0.9, 3.0
 """Conditions of silences.
 
 The period of the scans is the `_SCAN` quantile of the pauses. Samples are in bunches if at least
-`_FEWEST_BUNCHES` of them and their pauses are of one length, to within the share `_ALIKE`. After a
+`FEWEST_BUNCHES` of them and their pauses are of one length, to within the share `_ALIKE`. After a
 silence the value differs by at most `_STEPS` usual steps, the `_USUAL` quantile of those between
 two neighbours."""
 
@@ -70,7 +73,7 @@ class Pauses(NamedTuple):
         most = _STEPS * float(np.quantile(steps if is_long.all() else steps[~is_long], _USUAL))
         is_telling = 2.0 * most < float(np.ptp(values))
         where = np.flatnonzero(is_long)
-        if where.size >= _FEWEST_BUNCHES:
+        if where.size >= FEWEST_BUNCHES:
             both = length[where], np.diff(where)
             alike = all(np.ptp(one) <= _ALIKE * np.median(one) for one in both)
             is_telling &= not (alike and np.median(both[1]) > 1)

@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from valve_friction_ros.held_signals import LONG_PAUSE, Pauses
+from valve_friction_ros.held_signals import FEWEST_BUNCHES, LONG_PAUSE, Pauses
 from valve_friction_ros.identification.refusal import LittleMotionError, RefusalError
 from valve_friction_ros.model.drive import Drive
 from valve_friction_ros.model.recording import Recording, StampedRecord, StampedSignal
@@ -331,9 +331,6 @@ def _stamps(seconds: NDArray[np.float64]) -> NDArray[np.int64]:
     return stamps
 
 
-_FEWEST_BUNCHES = 10
-"""Least gaps of about one length between stamps in bunches. Chosen: outages differ in length."""
-
 _MOST_MISSING = 0.5
 """Share of a signal's time in gaps above which no record is built.
 
@@ -380,7 +377,7 @@ class Gap:
 
     def remedy(self, usual: str) -> str:
         """Return what to do: as `usual`, unless many gaps take most of the time."""
-        if not self.is_most or self.count < _FEWEST_BUNCHES:
+        if not self.is_most or self.count < FEWEST_BUNCHES:
             return usual
         return (
             f"{self.count} gaps take {percentage(self.share)} of its time; record it at a fixed "
@@ -407,7 +404,7 @@ def _gap(name: str, samples: Samples, period: int) -> Gap | None:
     since_start = float(samples.stamps[longest] - samples.stamps[0]) / 1e9
     whole = float(samples.stamps[-1] - samples.stamps[0])
     gaps = pauses[pauses > LONG_PAUSE * period]
-    is_regular = gaps.size >= _FEWEST_BUNCHES and 2 * np.median(gaps) > gaps.max()
+    is_regular = gaps.size >= FEWEST_BUNCHES and 2 * np.median(gaps) > gaps.max()
     return Gap(
         name,
         longest + 1,

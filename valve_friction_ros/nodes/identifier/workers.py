@@ -194,8 +194,7 @@ class Identification:
 
         Raises RefusedRecordError if the record cannot be identified, is old or of a valve that has
         since been changed, InternalError for a bug, which the monitor reports until an
-        identification succeeds. The findings of a refused
-        record are adopted too.
+        identification succeeds. The findings of a refused record are adopted too.
         """
         self._require_recent()
         self._is_running = True
