@@ -192,10 +192,6 @@ def export(tmp_path):
 ANSWERS = ("--pressure-unit", "bar", "--position-unit", "mm")
 
 
-def test_a_bag_is_no_table(refused, tmp_path):
-    assert ": a bag, not a table: " in refused("inspect", tmp_path)
-
-
 def test_what_would_be_read(command, told, export):
     code, out, err = command("inspect", export)
     assert code == 2
@@ -212,6 +208,27 @@ def test_what_would_be_read(command, told, export):
     assert found["questions"] == []
     out = told("inspect", export, *ANSWERS)
     assert sum(mark in "▁▂▃▄▅▆▇█" for mark in out) == 40 + 38  # a bad one leaves a hole
+
+
+@pytest.mark.parametrize(
+    ("bad", "told_of_it"),
+    [
+        (40, "'?' is not a valid value, and neither is any other of the 40 values of 'Druck'"),
+        (9, "(--maximum-bad-share 0.23)"),
+    ],
+)
+def test_what_identify_would_refuse(command, export, bad, told_of_it):
+    """It ended with 0, and showed a signal without values."""
+    rows = export.read_text().splitlines()
+    for row in range(1, 1 + bad):
+        time, _, stem = rows[row].split(";")
+        rows[row] = f"{time};?;{stem}"
+    rows[20] = rows[20].replace("Bad Input", "1,5")
+    export.write_text("\n".join(rows))
+    code, out, err = command("inspect", export, *ANSWERS)
+    assert code == 2
+    assert " bar " in out
+    assert told_of_it in err
 
 
 @pytest.mark.parametrize("text", [PLAIN, OF_NODE], ids=["plain", "of a node"])

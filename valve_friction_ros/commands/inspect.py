@@ -7,12 +7,13 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Sub-command `inspect`: show what would be read from a table, and how."""
+"""Sub-command `inspect`: show what would be read from a table or a bag, and how."""
 
 import argparse
 import json
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 from rich.table import Table
@@ -29,11 +30,14 @@ from valve_friction_ros.commands.arguments.recording import (
 from valve_friction_ros.commands.console import plain_console
 from valve_friction_ros.commands.process import ExitCode, complain
 from valve_friction_ros.held_signals import LONG_PAUSE
+from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.identification.rendering import plain
+from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.outside_text import printable
 from valve_friction_ros.records.bags.topics import is_bag
-from valve_friction_ros.records.layout import Layout
-from valve_friction_ros.records.table import OpenTables, ReadSignal
+from valve_friction_ros.records.layout import TableSignal
+from valve_friction_ros.records.recordings import ReadingOptions, read_recordings
+from valve_friction_ros.records.table import OpenTables, ReadSignal, fault_of
 from valve_friction_ros.streams import utc_second
 from valve_friction_ros.wording import lasting
 
@@ -92,12 +96,12 @@ def _picture(read: ReadSignal) -> str:
     return "".join(next(marks) if count else " " for count in counts)
 
 
-def _print(layout: Layout, reads: list[ReadSignal], signals: list[dict[str, Any]]) -> None:
-    console = plain_console()
-    console.print(layout.words, soft_wrap=True)
+def _print(shown: Mapping[str, Any], reads: Sequence[ReadSignal]) -> None:
+    console, signals = plain_console(), shown["signals"]
+    console.print(shown["words"], soft_wrap=True)
     others = [
         f"{printable(name) or 'without a name'} ({kind or 'empty'})"
-        for name, kind in layout.kinds.items()
+        for name, kind in shown["columns"].items()
         if name not in {one["name"] for one in signals}
     ]
     if signals:
@@ -138,37 +142,79 @@ def _draw(options: argparse.Namespace) -> None:
     figures.save_picture(record_figure(recorded.recording()), options.plot)
 
 
+class _Found(NamedTuple):
+    """What a file holds: the signals of each valve, open questions, and why signals are refused."""
+
+    words: str
+    valves: Mapping[str, Sequence[ReadSignal]]
+    columns: Mapping[str, str]
+    questions: Sequence[str] = ()
+    faults: Sequence[str] = ()
+
+
+def _table(path: Path, _: Valve, reading: ReadingOptions) -> _Found:
+    table = OpenTables((path, *reading.beside), reading.columns)
+    layout, valves = table.layout, {}
+    questions = list(layout.questions)
+    faults: list[str] = []
+    if not questions:
+        every = [one for group in layout.valves.values() for one in group]
+        reads = dict(zip(every, table.read(every, reading.stretch), strict=True))
+        valves = {label: [reads[one] for one in group] for label, group in layout.valves.items()}
+        questions = table.doubts([*reads.values()])
+        faults = [fault for read in reads.values() if (fault := fault_of(read, layout.form))]
+    if questions:
+        faults = [table.asked(questions)]
+    return _Found(layout.words, valves, layout.kinds, questions, faults)
+
+
+def _bag(path: Path, valve: Valve, reading: ReadingOptions) -> _Found:
+    valves, faults, notes = {}, [], {}
+    for one in read_recordings(path, valve, reading):
+        notes.update(dict.fromkeys(one.notes))
+        if isinstance(one.outcome, RefusalError):
+            faults.append(str(one.refused(one.outcome)))
+            continue
+        record, stamped = one.outcome, one.outcome.stamped
+        since = round(record.start_time * 1e9)
+        own = (stamped.drive, stamped.position) if stamped else ()
+        times = [signal.time for signal in own] or [record.time] * 2
+        values = [signal.value for signal in own] or [record.drive, record.position]
+        signals = zip(("pressure", "position"), ("Pa", "m"), times, values, strict=True)
+        valves[one.name] = [
+            ReadSignal(
+                TableSignal(quantity, one.name, unit, 0, (0,)),
+                since + np.rint(time * 1e9).astype(np.int64),
+                signal,
+                np.arange(time.size),
+            )
+            for quantity, unit, time, signal in signals
+        ]
+    return _Found("; ".join(["read as: a bag", *notes]), valves, {}, faults=faults)
+
+
 def run(options: argparse.Namespace) -> int:
     """Print what would be read; open questions give a line on stderr and exit code 2."""
     description = valve_of(options)
     reading = reading_options(options, description.columns if description else None)
-    if is_bag(options.file):
-        raise ValueError(
-            f"{options.file}: a bag, not a table: `ros2 bag info` lists its topics, and `identify` "
-            "reads it"
-        )
+    valve = description.valve if description else Valve()
     with reading_progress():
-        table = OpenTables((options.file, *reading.beside), reading.columns)
-        layout = table.layout
-        named = [(label, one) for label, group in layout.valves.items() for one in group]
-        reads: list[ReadSignal] = []
-        questions = list(layout.questions)
-        if not questions:
-            reads = table.read([one for _, one in named], reading.stretch)
-            questions = table.doubts(reads)
-    signals = [_inspected(label, read) for (label, _), read in zip(named, reads, strict=False)]
+        look = _bag if is_bag(options.file) else _table
+        found = look(options.file, valve, reading)
+    named = [(label, read) for label, reads in found.valves.items() for read in reads]
+    shown = {
+        "words": found.words,
+        "questions": found.questions,
+        "signals": [_inspected(label, read) for label, read in named],
+        "columns": found.columns,
+    }
     if options.json:
-        shown = {
-            "words": layout.words,
-            "questions": questions,
-            "signals": plain(signals),
-            "columns": layout.kinds,
-        }
-        print(json.dumps(shown, ensure_ascii=False))
+        print(json.dumps(plain(shown), ensure_ascii=False))
     else:
-        _print(layout, reads, signals)
-    if questions:
-        complain(options.command, table.asked(questions))
+        _print(shown, [read for _, read in named])
+    for fault in found.faults:
+        complain(options.command, fault)
+    if found.faults:
         return ExitCode.REFUSED
     save_columns(options, reading)
     if options.plot is not None:

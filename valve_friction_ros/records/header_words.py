@@ -20,20 +20,23 @@ from numpy.typing import NDArray
 from valve_friction_ros.records.units import KNOWN, SHARES, UNITS, unit_named
 
 _WORDS = {
-    "time": "time zeit timestamp stamp datetime date datum uhrzeit zeitstempel tstamp elapsed",
+    "time": "time zeit timestamp stamp datetime date datum uhrzeit zeitstempel tstamp elapsed "
+    "horodatage heure temps fecha hora tiempo ora tempo tijd",
     "position": "position pos stem travel lift hub stellung weg opening öffnung oeffnung feedback "
-    "readback rückmeldung displacement stroke ventilstellung stellweg stemposition",
+    "readback rückmeldung displacement stroke ventilstellung stellweg stemposition "
+    "course tige ouverture posición posicion carrera vástago posizione corsa posição curso "
+    "klepstand",
     "pressure": "pressure druck press air luft stelldruck actuator diaphragm antriebsdruck p "
-    "ventildruck",
+    "ventildruck pression presión presion pressione pressão pressao",
     "force": "force kraft load",
     "command": "setpoint sp op output out command cmd demand sollwert soll cv request target "
     "stellsignal stellgröße mv",
     "quality": "quality status qstatus confidence güte qualität qualitätscode qualitaet valid "
-    "questionable annotated good stat q",
+    "questionable annotated good stat q dataintegrity qualité qualite calidad qualità qualidade",
     "tag": "tag tagname tagid tagpath variablenname logname signalname parameter name point "
     "pointname signal series variable messstelle kanal sensor metric "
     "item id kks channel tags field varname",
-    "value": "value wert val messwert vtq y varvalue",
+    "value": "value wert val messwert vtq y varvalue floatvalue valeur valor valore",
     "unit": "unit units einheit eu uom engunits",
 }
 _QUANTITY = {word: name for name, words in _WORDS.items() for word in words.split()}

@@ -30,7 +30,7 @@ from valve_friction_ros.records.written_times import (
     is_time_of_day,
 )
 
-_NAMES = {"\t": "tab", ";": "semicolon", ",": "comma", "|": "bar", " ": "blanks"}
+_NAMES = {"\t": "tab", ";": "semicolon", ",": "comma", "|": "vertical bar", " ": "blanks"}
 _MOST_LABELS = 6
 LONGEST_QUOTE = 40
 """Most characters of a name in a message. Chosen: the message stays on one line."""
@@ -151,12 +151,15 @@ def _in_unit(unit: str) -> str:
 
 
 _DELIMITERS = ("\t", ";", ",", "|", " ")
+_SURE = "\t;|"
+"""Delimiters that no number, date or header contains."""
 _MOST_HEADER_ROWS = 8
 _TYPES = ("#TYPES", "#ROWS", "#datatype", "#group", "#default")
 """Prefixes of rows of Ignition and InfluxDB above the headers, which contain no headers."""
 _MOST_NAMES = 20
 _GROUPED = re.compile(r"-?\d{1,3}(?:(?:,\d{3})+|(?:\.\d{3})+)")
 """Numbers with thousands, or with three decimals."""
+_COMMA_OF_SECONDS = re.compile(r":\d\d,\d")
 _UP_TO_999 = re.compile(r"[1-9]\d{0,2}")
 _FILE_TIME = 116_444_736_000_000_000
 """Start of 1970 in Windows time, 100 ns since 1601."""
@@ -197,10 +200,8 @@ class Look:
     # Delimiter and decimal mark
 
     def _found_marks(self) -> tuple[str, str]:
-        if not self.raw.is_text:
-            return ".", ""
         form = self.form
-        delimiters = [form.delimiter] if form.delimiter else _DELIMITERS
+        delimiters = [form.delimiter] if form.delimiter else self._delimiters()
         decimals = [form.decimal] if form.decimal else (".", ",")
         scores: dict[tuple[str, str], int] = {}
         for delimiter in delimiters:
@@ -212,11 +213,18 @@ class Look:
                 )
         best = max(scores.values(), default=0)
         delimiter, decimal = next(key for key, score in scores.items() if score == best)
-        if best == 0 and not form.delimiter:
+        if best == 0 and not form.delimiter and self.raw.is_text:
             delimiter = self._of_headers()
         elif not form.decimal and scores.get((delimiter, ","), -1) == scores[delimiter, "."]:
             decimal = self._decimal_of_even(delimiter)
         return decimal, delimiter
+
+    def _delimiters(self) -> Sequence[str]:
+        """Return the marks that may separate cells: blanks only where no line has a surer mark."""
+        lines = list(filter(str.strip, self.raw.head))
+        lines = lines[len(lines) // 3 :]
+        is_sure = any(all(mark in line for line in lines) for mark in _SURE)
+        return _DELIMITERS[: -1 if is_sure else None] if self.raw.is_text else ("",)
 
     def _of_headers(self) -> str:
         """Return the delimiter that splits the first line most often, for rows without values."""
@@ -227,6 +235,8 @@ class Look:
     def _decimal_of_even(self, delimiter: str) -> str:
         """Return the decimal mark if both are possible for every number; ask if it matters.
 
+        Seconds with a decimal comma settle it; those with a point do not, as ISO 8601 has it.
+
         Thousands are likely where one column has 1.250 and 987: three decimals would give 987.000.
         """
         columns = itertools.zip_longest(
@@ -235,6 +245,8 @@ class Look:
         of_mark: dict[str, list[str]] = {".": [], ",": []}
         is_likely = False
         for cells in columns:
+            if any(map(_COMMA_OF_SECONDS.search, cells)):
+                return ","
             grouped = [cell for cell in cells if _GROUPED.fullmatch(cell)]
             small = sum(_UP_TO_999.fullmatch(cell) is not None for cell in cells)
             is_likely |= bool(grouped) and small > Columns.maximum_bad_share * len(cells)
@@ -311,7 +323,9 @@ class Look:
     def _header_rows(self) -> list[list[str]]:
         if self._paired:
             return self._paired
-        above = [row for _, row in self.rows[self.form.skip_rows : self.start] if any(row)]
+        above = [row for _, row in self.rows[self.form.skip_rows : self.start]]
+        while above and not any(above[-1]):
+            del above[-1]
         given = [value for name, value in vars(self.form).items() if name.endswith("_column")]
         for index, row in enumerate(above):
             names = _names(row)
@@ -319,6 +333,8 @@ class Look:
                 return above[index:]
         kept: list[list[str]] = []
         for row in reversed(above[-_MOST_HEADER_ROWS:]):
+            if not any(row):
+                break
             if row[0].startswith(_TYPES):
                 del kept[: row[0] == "#TYPES"]
             elif kept and sum(map(bool, row)) < 2 and not row[0].startswith("#"):
@@ -331,12 +347,15 @@ class Look:
         header = self._header_rows()
         values = [row for _, row in self.rows[self.start :] if any(row)]
         wide = max(map(len, [*header, *values]), default=0)
-        units = next((row for row in header[1:] if _are_units(row)), [""] * wide)
+        units = next((row for row in header[1:] if _are_units(row)), self._units_of_labview(wide))
         texts = [row for row in header if row is not units]
         if texts:
             texts.sort(key=lambda row: -sum(map(bool, row)))  # a stable order: the uppermost first
             texts = [row for row in texts if sum(map(bool, row)) >= 0.6 * sum(map(bool, texts[0]))]
         names = _names(texts[0]) if texts else [str(place + 1) for place in range(wide)]
+        for row in texts[1:]:  # a row of merged cells leaves some columns without a name
+            beside = itertools.zip_longest(names, row, fillvalue="")
+            names = [name or other for name, other in beside]
         names = _with_groups(names, header[: header.index(texts[0])] if texts else [])
         self._require_headers(names, values)
         names += [""] * (wide - len(names))
@@ -360,6 +379,13 @@ class Look:
             if column.place < len(units)
         }
         return columns
+
+    def _units_of_labview(self, wide: int) -> list[str]:
+        """Return the row of units in the head of a LabVIEW measurement file, else empty cells."""
+        above = [row for _, row in self.rows[: self.start]]
+        if ["X_Value"] in (row[:1] for row in above):
+            return next((row for row in above if row[:1] == ["Y_Unit_Label"]), [""] * wide)
+        return [""] * wide
 
     def _require_headers(self, names: Sequence[str], values: Sequence[Sequence[str]]) -> None:
         """Ask where rows have more numbers than headers: columns and headers do not correspond."""

@@ -48,7 +48,13 @@ _MOST_CHOICES, _MOST_TAGS = 6, 10_000
 _COARSE, _COARSE_IF_NAMED = 0.5, 60.0
 """Largest step of a time without a unit that is in seconds; the same of a column that is named in
 the format. Others may be milliseconds. Chosen: a sample per minute shows no motion."""
-_GOOD = re.compile(r"(good|ok|gut|valid|true|g|yes|ja|gültig)\b.*|\(?good\b.*", re.IGNORECASE)
+_GOOD = re.compile(
+    r"(good|ok|gut|valid|true|g|yes|ja|gültig|bon(ne)?|buen[ao]?|buon[ao]?|boa|goed)\b.*"
+    r"|\(?good\b.*",
+    re.IGNORECASE,
+)
+_OPC_UA_GOOD = re.compile("0x[0-3][0-9a-f]{7}", re.IGNORECASE)
+"""Status codes of OPC UA whose upper two bits are 0."""
 _DOUBT = re.compile("questionable|substituted|bad|invalid", re.IGNORECASE)
 _TRUE_OR_FALSE = re.compile("true|false|0|1", re.IGNORECASE)
 _OPC_GOOD, _OPC_MOST, _CERTAIN = 192, 255, 100
@@ -56,6 +62,10 @@ _OPC_GOOD, _OPC_MOST, _CERTAIN = 192, 255, 100
 
 _MILLISECONDS = re.compile(r"milli\w*|m ?sec|ms|sub ?sec\w*", re.IGNORECASE)
 """Headers of a column of milliseconds next to a time of day."""
+
+_NANOSECONDS = re.compile(r"n(?:ano)?_?s(?:ec(?:ond)?s?)?$", re.IGNORECASE)
+_SINCE_1970 = re.compile(r"1\d{9}")
+"""Headers of nanoseconds next to seconds, and these seconds."""
 
 _LONGEST_TRAVEL, _LEAST_PRESSURE = 0.5, 2e3
 """Longest travel of a stem, m, and least pressure of a moving actuator, Pa: a percentage is not
@@ -103,7 +113,9 @@ class _Recognition(Look):
         if self.form.time_column:
             column = self.by_name(self.form.time_column, "--time-column")
             return [(column.place,)] if column else []
-        dates: list[tuple[int, ...]] = [(column.place,) for column in self.of_kind("date")]
+        dated = self.of_kind("date")
+        of_source = [column for column in dated if "source" in column.name.casefold()]
+        dates: list[tuple[int, ...]] = [(column.place,) for column in of_source or dated]
         numeric = self._numeric_times()
         fine = [place for place in dates if not self._repeats(place[0])] or self._split_times()
         if fine or (dates and not numeric):
@@ -114,6 +126,8 @@ class _Recognition(Look):
             return [(column.place,) for column in numeric]
         possible = [one for one in self.of_kind("number", "") if not one.said.unit]
         self._ask_name("time", [one.name for one in numeric or possible], has_unit=False)
+        if not (numeric or dates):
+            self.questions[-1] += "; if it has none, add a column of times"
         return []
 
     def _split_times(self) -> list[tuple[int, ...]]:
@@ -122,11 +136,25 @@ class _Recognition(Look):
             is_rest = all(one.isdigit() and len(one) <= len("999") for one in clock.filled)
             if day.kind == "date" and is_rest and _MILLISECONDS.fullmatch(clock.name):
                 return [(day.place, clock.place)]
+            if self._are_stamps(day, clock):
+                return [(day.place, clock.place)]
             if (day.kind, clock.kind) == ("day", "clock"):
                 beside = self.columns[clock.place + 1 : clock.place + 2]
                 rest = (one.place for one in beside if _MILLISECONDS.fullmatch(one.name))
                 return [(day.place, clock.place, *rest)]
         return []
+
+    def _are_stamps(self, whole: SeenColumn, rest: SeenColumn) -> bool:
+        """Return whether two columns are seconds since 1970 and nanoseconds, as of ROS stamps."""
+        is_named = _NANOSECONDS.search(rest.name) is not None or not self.start
+        cells = [*whole.filled, *rest.filled]
+        return (
+            is_named
+            and all(map(str.isdigit, cells))
+            and all(map(_SINCE_1970.fullmatch, whole.filled))
+            and max(map(int, rest.filled), default=0) > 1e6
+            and max(map(len, rest.filled)) <= len("999999999")
+        )
 
     def _written(self) -> list[SeenColumn]:
         """Return the columns that may be times in an unknown format."""
@@ -165,6 +193,8 @@ class _Recognition(Look):
         zone = form.time_zone or self._stated_zone()
         if form.time_format:
             return TimeForm((form.time_format,), zone, has_zone="%z" in form.time_format)
+        if len(places) > 1 and column.kind == "number":
+            return TimeForm(unit="s")
         if len(places) > 1:
             parts = zip(*(self.columns[place].cells for place in places), strict=True)
             return self._dates([in_one(part) for part in parts if all(part)], zone)
@@ -395,9 +425,10 @@ class _Recognition(Look):
                 return lambda cell: bool(number_and_unit(cell, ".")) and float(cell) >= least
             if len(set(numbers)) == 1:  # of a code, a greater number is not a better one
                 return lambda cell: bool(number_and_unit(cell, ".")) and float(cell) == least
-        elif any(map(_GOOD.fullmatch, cells)):
-            return lambda cell: _GOOD.fullmatch(cell.strip()) is not None
-        elif len(set(cells)) == 1:
+        known = next((one for one in (_OPC_UA_GOOD, _GOOD) if any(map(one.fullmatch, cells))), None)
+        if known:
+            return lambda cell: known.fullmatch(cell.strip()) is not None
+        if len(set(cells)) == 1:
             return lambda cell: cell.strip() == cells[0]
         said = ", ".join(map(quoted, [*dict.fromkeys(cells)][:_MOST_CHOICES]))
         self.questions.append(
@@ -447,6 +478,10 @@ class _Recognition(Look):
         of_name = named([own])
         own = next((one for one in self.given if plain_name(one) in plain_name(own)), own)
         by_name = []
+        vague = [one for one in candidates if one[1].quantity in ("", "value")]
+        moving = [one for one in vague if len({*self._of_signal(one[0], one[2])}) > 1]
+        if len(vague) > 1 and len(moving) == 1:
+            candidates = [one for one in candidates if one not in vague or one in moving]
         for name, said, place in candidates:
             if said.quantity in ("", "value") and name not in self.given:
                 said = of_name._replace(unit=said.unit or of_name.unit)  # noqa: PLW2901
@@ -530,7 +565,9 @@ class _Recognition(Look):
             if len(found) == 1:
                 self._unit(quantity, *found[0])
             elif quantity not in self.asked and f"--{quantity}-column" not in self.lacking:
-                among = found or [each for each in candidates if each[1].quantity in _UNCLEAR]
+                unclear = [each for each in candidates if each[1].quantity in _UNCLEAR]
+                free = [each for each in unclear if each[1].quantity != "command"]
+                among = found or free or unclear
                 has_unit = not among or any(said.unit for _, said, _ in among)
                 self._ask_name(quantity, [name for name, _, _ in among], has_unit)
 

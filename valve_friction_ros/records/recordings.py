@@ -30,9 +30,9 @@ from valve_friction_ros.records.recorded_valve import WITHOUT_GAP, RecordedValve
 from valve_friction_ros.records.table import (
     OpenTables,
     ReadSignal,
+    fault_of,
     jumps_to_zero,
     left_out,
-    require_good,
 )
 from valve_friction_ros.records.table_rows import readable
 from valve_friction_ros.records.units import (
@@ -206,7 +206,8 @@ def _recorded(
     """Build the recording of one valve, with notes, from drive, position and opposing pressure."""
     form = table.layout.form
     for each in reads:
-        require_good(each, form)
+        if fault := fault_of(each, form):
+            raise ValueError(fault)
     if doubts := table.doubts(reads):
         raise ValueError(table.asked(doubts))
     notes = [] if table.layout.is_own else [table.layout.words]

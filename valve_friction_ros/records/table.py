@@ -300,7 +300,8 @@ class _Reader:
         what = "repeats" if repeats else "goes back"
         remedy = "sort the rows, or use the record before or after it"
         if repeats:
-            remedy = "export it with fractions of a second, or delete one of the rows"
+            more = "more decimals" if any("%f" in one for one in form.formats[:1]) else "fractions"
+            remedy = f"export it with {more} of a second, or delete one of the rows"
         elif form.formats and not form.has_zone and not form.zone:
             remedy += (
                 "; if the clocks were put back during the record, state the time zone (--time-zone)"
@@ -476,7 +477,9 @@ def _zones_apart(layouts: Sequence[Layout], names: Sequence[str]) -> Iterator[st
 
 
 def _shown(stamp: int, form: TimeForm) -> str:
-    return str(np.datetime64(int(stamp), "ns")) if form.formats else f"{stamp / 1e9:.12g} s"
+    if not form.formats:
+        return f"{stamp / 1e9:.12g} s"
+    return str(np.datetime64(int(stamp), "ns")).rstrip("0").rstrip(".").replace("T", " ")
 
 
 def _first(stamps: Any) -> int | None:
@@ -516,15 +519,21 @@ def jumps_to_zero(read: ReadSignal) -> str:
     )
 
 
-def require_good(read: ReadSignal, form: Columns) -> None:
-    """Refuse a signal with more bad values than permitted."""
+def fault_of(read: ReadSignal, form: Columns) -> str:
+    """Return why a signal with more bad values than permitted is refused; empty if it is not."""
     count = read.bad.total() - read.bad["repeated row"]
     whole = count + read.values.size
     if count <= form.maximum_bad_share * whole:
-        return
+        return ""
     share, most = count / whole, 100 * form.maximum_bad_share
     row, column, text = read.example
-    raise ValueError(
+    if not read.values.size:
+        return (
+            f"{read.signal.path}: row {row}, column {column!r}: {quoted(text)} is not a valid "
+            f"value, and neither is any other of the {whole} values of {read.signal.name!r}: name "
+            "another column, or how its entries are written (--decimal, --time-format)"
+        )
+    return (
         f"{read.signal.path}: row {row}, column {column!r}: {quoted(text)} is not a valid value, "
         f"and {count} of {whole} values of {read.signal.name!r} are bad, more than {most:.3g} %: "
         "use a stretch of the record without them, or allow more (--maximum-bad-share "

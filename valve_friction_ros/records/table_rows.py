@@ -387,12 +387,20 @@ def _library(name: str) -> Any:
 
 
 def _shown(cell: object) -> str:
-    """Return a cell as text, as in a CSV file."""
+    """Return a cell as text, as in a CSV file, but a number without a decimal mark.
+
+    So it is read alike beside texts with decimal commas and with decimal points.
+    """
     if isinstance(cell, datetime):  # includes pandas' time stamps, to the nanosecond; NaT is empty
         return cell.isoformat(sep=" ") if cell == cell else ""  # noqa: PLR0124
     if cell is None or (isinstance(cell, float) and math.isnan(cell)):
         return ""
-    return repr(float(cell)) if isinstance(cell, (float, np.floating)) else str(cell)
+    if not isinstance(cell, (float, np.floating)) or not math.isfinite(cell):
+        return str(cell)
+    mantissa, _, power = repr(float(cell)).partition("e")
+    whole, _, rest = mantissa.removesuffix(".0").partition(".")
+    power = str(int(power or "0") - len(rest))
+    return whole + rest + ("" if power == "0" else f"e{power}")
 
 
 def _frames(path: Path, form: Columns, places: Sequence[int] | None) -> Iterator["pd.DataFrame"]:

@@ -45,19 +45,21 @@ _JAVA = re.compile(
 _DATE = (
     r"(?:(?P<iso>\d{4})(?P<s1>[-/.])\d{1,2}(?P=s1)\d{1,2}"
     r"|(?P<compact>\d{8})"
-    r"|(?P<first>\d{1,2})(?P<s2>[-/.])(?P<second>\d{1,2})(?P=s2)(?P<year>\d{4}|\d{2})"
+    r"|(?P<first>\d{1,2})(?P<s2>[-/]|\. ?)(?P<second>\d{1,2})(?P=s2)(?P<year>\d{4}|\d{2})"
     r"|\d{1,2}(?P<s3>[-. ]{1,2})(?P<month>[A-Za-zäÄ]{3,9})(?P<s4>[-. ]{1,2})(?P<year3>\d{4}|\d{2})"
     r"|[A-Z][a-z]{2} \d{1,2}, (?P<american>\d{4}))"
 )
 _CLOCK = (
     r"(?P<hour>\d{1,2})(?P<colon>[:.]?)\d\d"
     r"(?:(?P=colon)(?P<seconds>\d\d)(?:(?P<mark>[.,:])(?P<fraction>\d{1,9}))?)?"
-    r"(?P<gap>\s*)(?P<half>[AaPp]\.?[Mm]\.?)?"
+    r"(?P<gap>\s*)(?P<half>[AaPp]\.?\s?[Mm]\.?)?"
     r"(?P<gap2>\s*)(?P<zone>[Zz]|[+\-]\d\d:?\d\d|[+\-]\d\d|UTC|GMT|CET|MEZ|CEST|MESZ)?"
 )
 _STAMP = re.compile(rf"{_DATE}(?P<join>[Tt]|,?\s+){_CLOCK}")
 _DAY = re.compile(_DATE)
 _OF_DAY = re.compile(r"\d{1,2}:\d\d(?::\d\d)?(?:[.,]\d+)?\s*(?:[AaPp][Mm])?")
+_POINTS = re.compile(r"(\d{1,2})\.(\d\d)\.(\d\d[.,]\d+)")
+"""A time of day with points in place of colons; without a fraction it may be a date."""
 _HALF = re.compile(r"[AaPp][Mm]$")
 _HOUR = DAY // 24
 _DURATION = re.compile(r"(?:\d+ days? )?\d{1,3}:\d\d:\d\d(?:[.,]\d+)?")
@@ -73,6 +75,9 @@ MIDNIGHT = " 00:00:00"
 
 _HOURS_ONLY = re.compile(r":\d\d(?:\.\d+)?[+\-]\d\d$")
 
+
+_EXACT = 2.0**53
+"""Greatest number of ns that a float holds to the last: 104 days."""
 
 _LEAST_SHORT_YEAR = 10
 """Least year of two digits beside - or /. Chosen: no export is from before 2010."""
@@ -92,12 +97,18 @@ def is_day(text: str) -> bool:
 def is_time_of_day(text: str) -> bool:
     """Return whether a text is a time without a date, or a duration."""
     text = text.strip()
-    return len(text) < 40 and bool(_OF_DAY.fullmatch(text) or _DURATION.fullmatch(text))
+    forms = (_OF_DAY, _POINTS, _DURATION)
+    return len(text) < 40 and any(form.fullmatch(text) for form in forms)
 
 
 def in_one(parts: Sequence[str]) -> str:
-    """Join a date, a time of day and milliseconds, of which one of the latter may be missing."""
+    """Join a date, a time of day and milliseconds, of which one of the latter may be missing.
+
+    Seconds since 1970 are joined with their nanoseconds.
+    """
     day, clock, *rest = (part.strip() for part in parts)
+    if day.isdigit():
+        return f"{day}.{clock:0>9}"
     if clock.isdigit():
         return f"{day}.{clock:0>3}"
     return f"{day.removesuffix(MIDNIGHT)} {clock}" + "".join(f".{one:0>3}" for one in rest)
@@ -142,7 +153,7 @@ def date_forms(texts: Sequence[str]) -> tuple[list[tuple[str, ...]], bool]:
         if found["first"] is None:
             month_possible = year_possible = False
             continue
-        if found["s2"] == ".":
+        if found["s2"][0] == ".":
             month_possible = year_possible = False
         elif len(found["year"]) == 2 and int(found["year"]) < _LEAST_SHORT_YEAR:
             day_possible = month_possible = False
@@ -202,7 +213,7 @@ def _normal(text: str) -> str:
     return re.sub(
         r"[A-Za-zäÄ]{3,9}",
         lambda word: _MONTHS.get(word[0].casefold(), word[0][:3].title()),
-        re.sub(r"([AaPp])\.?([Mm])\.?", r"\1\2", text),
+        re.sub(r"([AaPp])\.?\s?([Mm])\.?", r"\1\2", text),
     )
 
 
@@ -228,14 +239,8 @@ class WrittenTimes:
         import pandas as pd  # noqa: PLC0415 - slow to import
 
         if self._form.unit:
-            size = NANOSECONDS[self._form.unit]
-            later = max(self._form.origin, 0)  # in whole ns: a float of a date rounds to 256 ns
-            with np.errstate(over="ignore"):
-                scaled = numbers * size + (self._form.origin - later)
-            known = np.isfinite(scaled) & (np.abs(scaled) < 9e18 - later)
-            whole = np.rint(np.where(known, scaled, 0)).astype(np.int64) + later
-            whole = np.where(known, whole, NO_TIME)
-            return self._localized(pd.DatetimeIndex(whole)) if self._form.zone else whole
+            stamps = self._stamps(numbers)
+            return self._localized(pd.DatetimeIndex(stamps)) if self._form.zone else stamps
         if pd.api.types.is_datetime64_any_dtype(cells.dtype):
             times = pd.DatetimeIndex(cells)
             if times.tz is not None:
@@ -247,10 +252,24 @@ class WrittenTimes:
         times = self._dates(texts)
         return _ns(times) if self._form.has_zone else self._localized(times)
 
+    def _stamps(self, numbers: NDArray[np.float64]) -> NDArray[np.int64]:
+        """Convert numbers, in whole ns; of a date, the ns are the rounding of the number."""
+        size = NANOSECONDS[self._form.unit]
+        origin, later = divmod(self._form.origin, size)
+        floor = np.floor(numbers)
+        with np.errstate(over="ignore"):
+            known = np.abs((floor + origin) * size) < 9e18
+        whole = np.where(known, floor + origin, 0).astype(np.int64) * size
+        rest = np.rint(np.where(known, numbers - floor, 0) * size).astype(np.int64)
+        stamps = whole + rest + later
+        is_rounded = np.abs(numbers) * size > _EXACT
+        return np.where(known, np.where(is_rounded, (stamps + 500) // 1000 * 1000, stamps), NO_TIME)
+
     def _durations(self, texts: "pd.Series[str]") -> NDArray[np.int64]:
         import pandas as pd  # noqa: PLC0415 - slow to import
 
-        plain = texts.str.replace(",", ".", regex=False)
+        plain = texts.str.replace(_POINTS, r"\1:\2:\3", regex=True)
+        plain = plain.str.replace(",", ".", regex=False)
         half = plain.str[-2:].str.casefold() if _HALF.search("".join(plain.iloc[:1])) else None
         plain = plain if half is None else plain.str[:-2].str.strip()
         short = plain.str.count(":") == 1
