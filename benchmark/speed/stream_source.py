@@ -31,8 +31,8 @@ from valve_friction_ros import model
 from valve_friction_ros.streams import COLUMNS
 
 _SECOND = 1_000_000_000
-_START = 1_700_000_000
-"""Stamp of the first sample, s."""
+_START = int(time.time())
+"""Stamp of the first sample, s: the node compares stamps with its clock."""
 _TURN = 1e-3
 """Time between two checks for due samples, s."""
 _PATIENCE = 300.0

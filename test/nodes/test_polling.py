@@ -10,6 +10,7 @@
 """Streams that are polled, what is read out of their messages, and the executor of the nodes."""
 
 import contextlib
+import itertools
 import time
 from types import SimpleNamespace
 
@@ -33,7 +34,7 @@ from std_srvs.srv import Trigger
 
 from valve_friction_ros.nodes.dashboard import status_of, statuses_in
 from valve_friction_ros.nodes.identifier.valve_inputs import ValveInputs, _Input
-from valve_friction_ros.nodes.plumbing import messages
+from valve_friction_ros.nodes.plumbing import messages, running
 from valve_friction_ros.nodes.plumbing.messages import (
     arrivals_of,
     position_of,
@@ -488,6 +489,15 @@ def said(message="friction normal", age="1.0", ratio="1.02", count="5"):
     pairs = {"friction_ratio": ratio, "estimate_age [s]": age, "buffered_samples": count}
     values = [KeyValue(key=key, value=value) for key, value in pairs.items()]
     return DiagnosticStatus(name="/v/identifier: friction", message=message, values=values)
+
+
+@pytest.mark.parametrize(("nodes", "polls"), [(1, 100), (50, 20), (500, 10)])
+def test_hundreds_of_nodes_are_polled_once_a_second(monkeypatch, nodes, polls):
+    """A poll costs as much for one sample as for a hundred; a hundred turns take ten seconds."""
+    clock = itertools.count()
+    monkeypatch.setattr(running.time, "monotonic", lambda: next(clock) / 10)
+    turns = running._polls([object()] * nodes)
+    assert sum(bool(polled) for polled in itertools.islice(turns, 100)) == polls
 
 
 def test_a_mark_is_that_of_its_status_and_its_essential_keys():
