@@ -21,7 +21,7 @@ from histories import refused as refusal_at
 from kept_rows import csv_rows
 
 from valve_friction_ros.commands.arguments.declared import DECLARATIONS
-from valve_friction_ros.health import Baseline, FrictionLimits, Level
+from valve_friction_ros.health import Baseline, FrictionLimits, Level, SlidingFriction
 from valve_friction_ros.history import MONTH, HistoryFile, KeptBaseline
 from valve_friction_ros.identification import Verdict
 
@@ -86,6 +86,18 @@ class TestTable:
             history.add(success(START + day * DAY, friction, method=method))
         (valve,) = valves(path=history.path)
         assert (valve["trend"]["days"], valve["trend"]["significant"]) == (5, False)
+
+    def test_other_speeds_than_that_of_the_baseline(self, tmp_path, listed):
+        """The list ended without a word, below a friction that grew from week to week."""
+        history = HistoryFile(tmp_path / "history.sqlite")
+        healthy = Baseline(sliding=SlidingFriction(300.0, 5.0, 0.8e-3))
+        history.set_baseline(VALVE, KeptBaseline(healthy, START + 1, START))
+        for week, (force, speed) in enumerate(((300, 0.8), (350, 6.0), (430, 8.0), (550, 9.0))):
+            slid = SlidingFriction(force, 5.0, speed * 1e-3)
+            history.add(success(START + week * 7 * DAY, sliding=slid, baseline=healthy))
+        assert "trend: none, because 3 of 4 records move" in " ".join(
+            listed(path=history.path).split()
+        )
 
     def test_too_few_days_have_no_trend(self, listed, valves):
         assert "trend" not in listed("--valve", "LV-7")

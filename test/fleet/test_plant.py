@@ -211,6 +211,24 @@ def test_a_first_survey_ranks_by_the_dead_band_and_says_what_to_do(tmp_path, cap
     assert shares == pytest.approx(exact, rel=0.03)
 
 
+def test_recordings_without_a_date_are_named(tmp_path, capsys):
+    """They were missing in the history without a word, and their message came once for each."""
+    rows = german(QUARTERS[0], *stroke(450.0, 1)).splitlines()
+    seconds = (f"{one / 100:.2f};".replace(".", ",") for one in range(len(rows) - 1))
+    undated = [
+        f"{second}{row.partition(';')[2]}" for second, row in zip(seconds, rows[1:], strict=True)
+    ]
+    text = "\n".join(["t (s);Stelldruck (bar);Ventilstellung (%)", *undated])
+    make_plant(tmp_path, {"FV-103 a.csv": text, "FV-103 b.csv": text})
+    assert identify(tmp_path, "--history", tmp_path / "history.sqlite", *BERLIN) == 0
+    out, err = capsys.readouterr()
+    assert "2 results not filed, because the times have no date: FV-103 a.csv, FV-103 b.csv" in err
+    assert out.splitlines()[0].split() == ["friction", "records"]
+    assert out.splitlines()[1].split()[-1] == "2"
+    assert out.count("watch FV-103 a.csv FV-103 and 1 more record: ") == 1
+    assert "FV-103 b.csv" not in out
+
+
 def test_files_of_single_signals_are_one_record_of_their_valve(tmp_path, capsys):
     """By their names, by the tags in the table, and by the quarter where there are several."""
     table = (

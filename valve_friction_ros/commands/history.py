@@ -25,6 +25,7 @@ from valve_friction_ros.commands.arguments.declared import EARLIEST, LATEST
 from valve_friction_ros.commands.arguments.identification import chosen_valves, has_failed
 from valve_friction_ros.commands.console import plain_console
 from valve_friction_ros.commands.process import ExitCode
+from valve_friction_ros.health.comparison import friction_name
 from valve_friction_ros.health.diagnosis import FrictionState
 from valve_friction_ros.history import (
     AlarmRecording,
@@ -39,6 +40,7 @@ from valve_friction_ros.history import (
     read_usage,
     valve_histories,
 )
+from valve_friction_ros.history.trend import LEAST_ESTIMATES
 from valve_friction_ros.identification.rendering import parameter_columns, plain
 from valve_friction_ros.identification.settings import SLIDING
 from valve_friction_ros.outside_text import csv_text, printable
@@ -46,7 +48,14 @@ from valve_friction_ros.records.files import write_whole
 from valve_friction_ros.response import ResponseSummary
 from valve_friction_ros.streams import DAY, nanoseconds, utc, utc_day, utc_second
 from valve_friction_ros.usage import BINS, Usage, UsedDay, ValveUsage
-from valve_friction_ros.wording import Code, headline, member_words, percentage, with_width
+from valve_friction_ros.wording import (
+    Code,
+    headline,
+    member_words,
+    percentage,
+    sentence,
+    with_width,
+)
 
 
 def _valve_table(valve: KeptValve, *columns: str) -> Table:
@@ -314,7 +323,7 @@ def _print_table(histories: Sequence[ValveHistory]) -> None:
             time = time_text(row.time, "seconds")[:-1].replace("T", " ")
             table.add_row(time, *_cells(row))
         console.print(table)
-        for line in _trend_lines(history.trend):
+        for line in _trend_lines(history.trend) or _without_trend(history):
             console.print(line)
         for line in service_lines(history.usage, history.alarms, history.response):
             console.print(line)
@@ -343,6 +352,28 @@ def _trend_lines(trend: Trend | None) -> list[str]:
             f"{expected} (95 %: {earliest} to {latest})"
         )
     return lines
+
+
+def _without_trend(history: ValveHistory) -> list[str]:
+    """Say that there is no trend because the records move at other speeds than the baseline."""
+    kept = history.set_baseline
+    healthy = None if kept is None else kept.baseline
+    if kept is None or healthy is None or healthy.sliding is None:
+        return []
+    known = [
+        entry
+        for entry in history.entries
+        if (one := entry.parameters.get(SLIDING)) and one.value > 0 and entry.time >= kept.since
+    ]
+    far = [entry for entry in known if entry.point(healthy) is None]
+    if not far or len(known) < LEAST_ESTIMATES:
+        return []
+    speed = sentence(friction_name(SLIDING, healthy.sliding.speed))
+    return [
+        f"trend: none, because {len(far)} of {len(known)} records move the stem at other speeds "
+        f"than the baseline ({speed}), and friction between these speeds is not known well enough: "
+        "move the stem as for the baseline"
+    ]
 
 
 def _print_usages(options: argparse.Namespace) -> int:

@@ -284,9 +284,9 @@ _BAD = ("bad", "watch")
 
 
 def print_tally(counted: Tally) -> None:
-    """Print the numbers of identified and refused valves, with the reasons."""
+    """Print the numbers of identified and refused records, with the reasons."""
     console = OutputConsole(highlight=False, markup=False)
-    table = Table("Coulomb friction", "valves", box=None, header_style="bold")
+    table = Table("friction", "records", box=None, header_style="bold")
     table.columns[1].justify = "right"
     for outcome, count in sorted(counted.outcomes.items(), key=lambda one: one[0] == REFUSED):
         table.add_row(outcome, str(count))
@@ -299,11 +299,20 @@ def print_tally(counted: Tally) -> None:
 
 
 def print_alarms(rows: Iterable[Mapping[str, Cell]]) -> None:
-    """Print the valves that need attention, most urgent first, and what to do."""
+    """Print the valves that need attention, most urgent first, and what to do.
+
+    Records of a tag with the same message, as undated ones may be, are one line.
+    """
     console = OutputConsole(highlight=False, markup=False)
-    alarms = [row for row in ranked(rows) if reaches(row, Level.WARN) or row.get("survey") in _BAD]
-    for row in alarms[:_SHOWN_ALARMS]:
+    alike: dict[tuple[Cell, ...], list[Mapping[str, Cell]]] = {}
+    for row in ranked(rows):
+        if reaches(row, Level.WARN) or row.get("survey") in _BAD:
+            key = (row["valve"], row["message"]) if row["valve"] else (row["recording"],)
+            alike.setdefault(key, []).append(row)
+    alarms = [*alike.values()]
+    for row, *others in alarms[:_SHOWN_ALARMS]:
         name = " ".join(filter(None, (str(row["recording"]), str(row["valve"]))))
+        name += f" and {numbered(len(others), 'more record')}" if others else ""
         level = row["level"] if reaches(row, Level.WARN) else row["survey"]
         console.print(f"{level:>6} {name}: {row['message']}", soft_wrap=True)
         if row.get("what_to_do"):
@@ -449,6 +458,18 @@ def _file(filings: Sequence[Filing], results: ResultsFile, options: argparse.Nam
     print("; ".join(told), file=sys.stderr)
 
 
+def _tell_undated(rows: Sequence[Mapping[str, Cell]]) -> None:
+    """Print which results are missing in the history, because their times have no date."""
+    names = [str(row["recording"]) for row in rows if not (row["began"] or row["error"])]
+    if names:
+        more = f" and {len(names) - _SHOWN_SKIPPED} more" if len(names) > _SHOWN_SKIPPED else ""
+        print(
+            f"{numbered(len(names), 'result')} not filed, because the times have no date: "
+            f"{', '.join(names[:_SHOWN_SKIPPED])}{more}: export them with dates",
+            file=sys.stderr,
+        )
+
+
 def run(options: argparse.Namespace) -> int:
     """Identify the remaining recordings, and print a tally."""
     _require_sense(options)
@@ -483,6 +504,8 @@ def _run(options: argparse.Namespace, plans: Mapping[str, Plan], share_out: Shar
             )
             return stop.exit_code
     counted, rows = tally(mine), [row for entry in mine for row in entry.rows]
+    if options.history is not None:
+        _tell_undated(rows)
     print_tally(counted)
     present = rows if options.plant is None else _newest(rows)
     print_alarms(present)

@@ -25,6 +25,7 @@ from urllib.parse import quote
 
 from valve_friction_ros import __version__
 from valve_friction_ros.fleet.rows import COLUMNS, HEIGHT, PICTURE, WIDTH, Cell, ranked, status_of
+from valve_friction_ros.identification.settings import SLIDING
 from valve_friction_ros.outside_text import csv_text, page_environment
 from valve_friction_ros.records.files import write_whole
 from valve_friction_ros.wording import in_zone, number_and_width, numbered, percentage
@@ -182,12 +183,13 @@ class Tally(NamedTuple):
 
 
 def tally(entries: Iterable[RecordingRows]) -> Tally:
-    """Count the valves of all entries."""
+    """Count the records of all entries, by the verdict on the friction that is compared."""
     outcomes: Counter[str] = Counter()
     reasons: dict[str, list[str]] = {}
     for entry in entries:
         for row in entry.rows:
-            outcomes[REFUSED if row["error"] else str(row["coulomb_friction_verdict"])] += 1
+            verdict = row[f"{SLIDING}_verdict"] or row["coulomb_friction_verdict"]
+            outcomes[REFUSED if row["error"] else str(verdict)] += 1
             if row["error"]:
                 reasons.setdefault(reason_of(str(row["error"])), []).append(entry.recording)
     return Tally(outcomes, dict(sorted(reasons.items(), key=lambda one: -len(one[1]))))
