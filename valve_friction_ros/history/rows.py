@@ -17,6 +17,7 @@ import uuid
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import fields, replace
+from functools import cache
 from itertools import groupby
 from pathlib import Path
 from typing import Any, TypeVar
@@ -110,19 +111,18 @@ _READERS: dict[Any, Callable[[Any], Any]] = {
 }
 
 
-def _stored(kind: Any) -> Iterator[tuple[str, str, Any]]:
-    """Yield name, column and type of each stored field of a type."""
-    names = _COLUMNS.get(kind, {})
-    for one in fields(kind):
-        if (column := names.get(one.name, one.name)) is not None:
-            yield one.name, column, one.type
+@cache
+def _stored(kind: Any) -> tuple[tuple[str, str, Any], ...]:
+    """Return name, column and type of each stored field of a type."""
+    columns = {one.name: one.name for one in fields(kind)} | _COLUMNS.get(kind, {})
+    return tuple((one.name, to, one.type) for one in fields(kind) if (to := columns[one.name]))
 
 
 def columns_of(one: Any, kind: Any = None) -> dict[str, Any]:
     """Return the columns of a value; if it is None, the columns of its `kind`, all None."""
     return {
         column: None if one is None else _WRITERS.get(of, lambda value: value)(getattr(one, name))
-        for name, column, of in _stored(kind or type(one))
+        for name, column, of in _stored(kind or one.__class__)
     }
 
 

@@ -451,8 +451,8 @@ def _serve(node: Dashboard, limited: contextlib.ExitStack) -> int:
 
     Once the server runs, Ctrl-C limits the time of everything in `limited`.
     """
-    # Optional libraries that engineio, httpx and uvicorn, imported below, do not need.
-    for unused in ("aiohttp", "tornado", "httpx._main", "watchfiles"):
+    # Optional libraries that engineio, httpx and uvicorn, imported below, do not need: 8 MB.
+    for unused in ("aiohttp", "tornado", "requests", "httpx._main", "watchfiles"):
         sys.modules.setdefault(unused, None)  # type: ignore[arg-type]
     try:
         from valve_friction_ros.dashboard.pages import server  # noqa: PLC0415

@@ -16,6 +16,7 @@ from typing import Any
 from zoneinfo import ZoneInfo
 
 from nicegui import ui
+from nicegui.elements.mixins.text_element import TextElement
 
 from valve_friction_ros.dashboard.context import DashboardContext
 from valve_friction_ros.dashboard.live_state import Entry
@@ -135,18 +136,17 @@ _LONG = 40
 """Length above which a value is shown below its name."""
 
 
-def text(tag: str, words: str, css: str = "") -> ui.element:
+def text(tag: str, words: str, css: str = "", **attributes: str) -> TextElement:
     """Make an element with a text, which is never parsed as markup."""
-    with element(tag, css) as made:
-        ui.label(words)
+    made = TextElement(tag=tag, text=words).classes(css)
+    for name, value in attributes.items():
+        made.props[name.replace("_", "-")] = value
     return made
 
 
-def link(words: str, href: str, css: str = "", **attributes: str) -> ui.element:
+def link(words: str, href: str, css: str = "", **attributes: str) -> TextElement:
     """Make a link."""
-    with element("a", css, href=href, **attributes) as made:
-        ui.label(words)
-    return made
+    return text("a", words, css, href=href, **attributes)
 
 
 def search_field(words: str, searched: str, select: Callable[..., None]) -> None:
@@ -165,13 +165,6 @@ def redraw(body: ui.element, draw: Callable[[], object]) -> None:
     body.clear()
     with body:
         draw()
-
-
-def retitle(made: ui.element, words: str) -> None:
-    """Change the text of an element made by `text`."""
-    label = made.default_slot.children[0]
-    if isinstance(label, ui.label):
-        label.set_text(words)
 
 
 def chip(state: str, word: str, letter: str = "") -> ui.element:
@@ -268,7 +261,7 @@ class EntryList:
         self._empty = empty
         self._body = element("div", "vf-entries")
         self._names: tuple[str, ...] | None = None
-        self._values: list[ui.label] = []
+        self._values: list[TextElement] = []
 
     def show(self, entries: Sequence[Entry]) -> None:
         """Show these values."""
@@ -290,5 +283,4 @@ class EntryList:
                 for entry in entries:
                     text("dt", entry.name)
                     long = len(entry.text) > _LONG
-                    with element("dd", "vf-dd-long" if long else ""):
-                        self._values.append(ui.label(""))
+                    self._values.append(text("dd", "", "vf-dd-long" if long else ""))

@@ -37,7 +37,6 @@ from valve_friction_ros.dashboard.pages.theme import (
     chip,
     element,
     link,
-    retitle,
     table,
     table_head,
     table_row,
@@ -118,7 +117,7 @@ class ValveSignals:
         """Show the samples that have arrived since the last call."""
         self._shown += 1
         note = self._strip.note()
-        retitle(self._note, note)
+        self._note.set_text(note)
         self._note.set_visibility(bool(note))
         revision = self._strip.revision
         if revision == self._drawn:

@@ -9,6 +9,8 @@
 
 """The page *Valve*: the full state of one valve, and the actions of its identifier."""
 
+import asyncio
+import contextlib
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -33,7 +35,6 @@ from valve_friction_ros.dashboard.pages.theme import (
     frame,
     link,
     redraw,
-    retitle,
     text,
 )
 from valve_friction_ros.dashboard.pages.valve_cards import (
@@ -83,15 +84,15 @@ class _ValveHead:
 
     def show(self, view: ValveView, heard: Heard | None, state: str) -> None:
         """Show state and diagnosis of the valve."""
-        retitle(self._title, view.tag)
+        self._title.set_text(view.tag)
         ui.page_title(f"{view.tag} · valve friction")
         self._place.set_text(view.node)
         letter = "" if state in ("silent", "unheard") else view.signal.value
         words = "not heard" if heard is None else state_words(heard)
         redraw(self._chip, lambda: chip(state, words, letter))
-        retitle(self._advice, view.advice)
+        self._advice.set_text(view.advice)
         self._advice.set_visibility(bool(view.advice))
-        retitle(self._sentence, view.sentence or "No message has been received from this valve.")
+        self._sentence.set_text(view.sentence or "No message has been received from this valve.")
 
     def show_facts(self, view: ValveView, heard: Heard | None) -> None:
         """Show the numbers and their age."""
@@ -326,6 +327,8 @@ def _view_of_history(kept: ValveHistory | None) -> ValveView | None:
 
 _MOST_EVENTS = 500
 """Maximum number of alarm events in the trend, the newest."""
+_READING = 1.0
+"""Longest time, s, for which a page waits for the history before it is sent without."""
 _PERIOD = 0.2
 _SLOWER = 5
 """Timer beats per update of everything but the signals."""
@@ -372,7 +375,7 @@ class _ValvePage:
             return self._kept
         return heard.view if heard is not None else ValveView(self._node, self._node)
 
-    def draw(self) -> None:
+    async def draw(self) -> None:
         with element("article", "vf-valve"):
             with element("div", "vf-valve-head"):
                 self._head.draw()
@@ -385,6 +388,8 @@ class _ValvePage:
                     text("p", "Your account has view-only access.", "vf-none")
             with element("div", "vf-cards"):
                 self._draw_cards()
+        with contextlib.suppress(TimeoutError, asyncio.TimeoutError):  # the same from Python 3.11
+            await asyncio.wait_for(self._read(), _READING)
         self._look()
         ui.timer(_PERIOD, self._tick)
 
@@ -461,7 +466,7 @@ class _ValvePage:
     # The history
 
     async def _read(self) -> None:
-        self._revision = self._context.history.revision
+        revision = self._context.history.revision
         try:
             self._history = await run.io_bound(self._context.history.valve, self._node)
             self._kept = _view_of_history(self._history)
@@ -485,6 +490,7 @@ class _ValvePage:
             draws = (*draws, (self._alarms_body, lambda: draw_alarms(kept, zone)))
         for body, draw in draws:
             redraw(body, draw)
+        self._revision = revision
 
     async def _events(self) -> list[AlarmEvent]:
         chosen = AlarmFilter(valve=self._node)
@@ -515,7 +521,7 @@ class _ValvePage:
         self._revision = -1  # files and history may be new
 
 
-def valve_page(context: DashboardContext, query: dict[str, str]) -> None:
+async def valve_page(context: DashboardContext, query: dict[str, str]) -> None:
     """Draw the page of the valve named by ``node`` in the address."""
     node = query.get("node", "")
 
@@ -523,4 +529,4 @@ def valve_page(context: DashboardContext, query: dict[str, str]) -> None:
         return f"/valve?{urlencode({'node': node, **common})}"
 
     with frame(context, query, "Valve · valve friction", here) as page:
-        _ValvePage(context, node, page).draw()
+        await _ValvePage(context, node, page).draw()
