@@ -13,6 +13,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from enum import Enum
+from sys import float_info
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -115,7 +116,7 @@ def models_compared(
     samples = float(residuals[0].size)
     independent = min(map(independent_samples, residuals))
     squares = [float(np.mean(one**2)) for one in residuals]
-    least = np.finfo(float).tiny
+    least = float_info.min
     fits = [-0.5 * independent * math.log(max(one, least)) for one in squares]
     costs = [0.5 * count * math.log(independent) for count in free]
     log_ratio = (fits[0] - costs[0]) - (fits[1] - costs[1])

@@ -30,7 +30,14 @@ from valve_friction_ros.model.linear_motion import (
     sliding_friction,
 )
 from valve_friction_ros.model.stem_motion import STRIBECK_STEP, advance_stem
-from valve_friction_ros.model.stem_tangent import Tangent, begin_step, face, keep, set_anew
+from valve_friction_ros.model.stem_tangent import (
+    FORGOTTEN,
+    Tangent,
+    begin_step,
+    face,
+    keep,
+    set_anew,
+)
 
 _FALLEN = 6.0
 """Speed over the Stribeck velocity above which the remaining fall is below rounding: e⁻³⁶."""
@@ -374,8 +381,9 @@ def _carry(
             viscous, spring, mass = facing[2, one], facing[3, one], facing[4, one]
             place += viscous * x_viscous + spring * x_spring + mass * x_mass
             following += viscous * v_viscous + spring * v_spring + mass * v_mass
-            state[0, one], state[1, one] = place, following
-            tangent.positions[sample + 1, one] = place
+            state[0, one] = place if abs(place) > FORGOTTEN else 0.0
+            state[1, one] = following if abs(following) > FORGOTTEN else 0.0
+            tangent.positions[sample + 1, one] = state[0, one]
 
 
 @compiled_products
@@ -417,9 +425,9 @@ def _carry_falling(
             after = facing[0, one] * signals[sample + 1, one] + facing[1, one]
             after -= slip * then.share + stribeck * then.by_stribeck
             after -= facing[2, one] * w + facing[3, one] * y + facing[4, one] * b
-            state[0, one], state[1, one] = slid(
-                slide, state[0, one], state[1, one], force, after - force
-            )
+            place, following = slid(slide, state[0, one], state[1, one], force, after - force)
+            state[0, one] = place if abs(place) > FORGOTTEN else 0.0
+            state[1, one] = following if abs(following) > FORGOTTEN else 0.0
             tangent.positions[sample + 1, one] = state[0, one]
 
 

@@ -45,6 +45,11 @@ _STEEPEST = 4.0
 zero, the time of the drop has no derivative."""
 
 
+FORGOTTEN = 1e-100
+"""Derivative below which it is zero: one that decayed on to 1e-308 would slow the processor down
+tenfold."""
+
+
 class Tangent(NamedTuple):
     """Derivatives by p parameters: of the drive of the stem, and of the stem itself.
 

@@ -191,6 +191,20 @@ def test_from_zero_upwards(name):
     assert wrong.mean() < 0.01
 
 
+def test_a_derivative_that_has_decayed_is_zero():
+    """A start long ago does not matter; numbers below 1e-308 would slow the processor down."""
+    plant = Plant(0, slips=False)
+    course = plant.course._replace(
+        travel=np.inf, force=plant.span * (1.0 + TIME), anew=np.full(STEPS, np.nan)
+    )
+    plant.course = course
+    plant.at["force_lag"] = plant.at["delay"] = 0.0
+    by_start = np.abs(plant.slopes()["start_position"])
+    assert by_start[0] > 0.1
+    assert by_start[-1] == 0.0
+    assert by_start[by_start > 0.0].min() > 1e-110
+
+
 @pytest.fixture(scope="module")
 def model():
     time = np.arange(2000) / 100
@@ -237,6 +251,21 @@ class TestSensitivity:
         at = {**TRUTH, "start_position": model.record.start, "slip_force": 0.0}
         found = model.sensitivity(at, ("coulomb_friction", "slip_force"), model.readings(at))
         assert np.abs(found[:, 1]).max() > 0.1
+
+    def test_by_a_pressure_without_noise(self):
+        """Both halves agree: the stem is simulated once, and both have its derivatives."""
+        time = np.arange(2000) / 100
+        pressure = 6.5e4 + 4e4 * np.sin(2 * np.pi * time / 9)
+        stem = simulate(BENCH_VALVE, LOW_FRICTION, pressure, 0.01).position
+        record = fitted_record(stamped_record(Recording(0.01, pressure, stem)), BENCH_VALVE)
+        model = BroadModel(record, LOW_FRICTION.spring_constant)
+        at, names = {**TRUTH, "start_position": record.start}, ("coulomb_friction", "slip_force")
+        assert len(model.halves) == 1
+        for at["slip_force"] in (0.0, 50.0):
+            readings = model.readings(at)
+            assert np.abs(readings[0] - stem[1:]).max() < 1e-3
+            np.testing.assert_array_equal(*readings)
+            np.testing.assert_array_equal(*model.sensitivity(at, names, readings))
 
     @pytest.mark.parametrize("endless", [np.inf, np.nan, -1e200])
     def test_a_derivative_without_bounds_is_none(self, model, monkeypatch, endless):

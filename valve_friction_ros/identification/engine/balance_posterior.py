@@ -13,6 +13,7 @@ import copy
 import itertools
 import math
 from collections.abc import Mapping, Sequence
+from sys import float_info
 from typing import NamedTuple
 
 import numpy as np
@@ -286,14 +287,14 @@ class Posterior:
         gradient = np.pad(gradient[:size], (0, max(size - gradient.size, 0)))
         along = choice.covariance @ gradient
         value, variance = float(gradient @ choice.estimate), float(gradient @ along)
-        widened = float(along @ choice.scores @ along) / max(variance, np.finfo(float).tiny)
+        widened = float(along @ choice.scores @ along) / max(variance, float_info.min)
         factor = float(np.clip(widened, 1.0, _LARGEST_SCATTER))
         if self.regression.lag.is_known:
-            return value, 0.0, math.sqrt(max(factor * variance, np.finfo(float).tiny))
+            return value, 0.0, math.sqrt(max(factor * variance, float_info.min))
         own = float(choice.covariance[index, index])
         slope = float(along[index]) / own
         rest = max(variance - slope**2 * own, 1e-9 * variance)
-        return value, slope, math.sqrt(max(factor * rest, np.finfo(float).tiny))
+        return value, slope, math.sqrt(max(factor * rest, float_info.min))
 
     def number(self, name: str, gradient: _Array, spread: float) -> Estimated:
         """Return a number with its interval; `spread` is its further deviation beside the lag.
@@ -384,7 +385,7 @@ def posterior_of(regression: Regression) -> Posterior:
         variance = regression.noise_variance(solved) + max(lasting, regression.least_variance)
         power = float(mean @ mean) / count
         inflated = max(power / variance, 1.0) * inflation(
-            mean / math.sqrt(max(power, np.finfo(float).tiny)),
+            mean / math.sqrt(max(power, float_info.min)),
             max(mean.size // regression.strokes, 1),
         )
         solved = regression.solve(

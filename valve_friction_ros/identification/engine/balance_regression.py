@@ -12,6 +12,7 @@
 import math
 from collections.abc import Mapping
 from functools import cached_property
+from sys import float_info
 from typing import NamedTuple
 
 import numpy as np
@@ -131,7 +132,7 @@ class Regression:
         self.inertia = MASS_PER_AREA * (valve.diaphragm_area or 0.0)
         if valve.diaphragm_area is None:
             fastest = float(np.quantile(np.abs(accelerations[0][taken]), 0.98))
-            self.inertia = span / max(fastest, np.finfo(float).tiny)
+            self.inertia = span / max(fastest, float_info.min)
         stiff = self.spring * range_
         minutes = float(averages.time[-1] - averages.time[0]) / 60.0
         shares = {name: one.deviation for name, one in IMPERFECTIONS.items()}
@@ -434,7 +435,7 @@ def _shared(own: _Array, cross: _Array, right: _Array, independent: float) -> tu
     to (1 − s)/√n. A share that may be chance is dropped: the prior alone remains.
     """
     values, vectors = np.linalg.eigh(own)
-    root = np.sqrt(np.maximum(values, max(1e-13 * float(values[-1]), np.finfo(float).tiny)))
+    root = np.sqrt(np.maximum(values, max(1e-13 * float(values[-1]), float_info.min)))
     shares, turned = np.linalg.eigh((vectors / root).T @ cross @ (vectors / root))
     back = (vectors * root) @ turned
     shares = np.clip(shares, _LEAST_SHARED, 1.0)

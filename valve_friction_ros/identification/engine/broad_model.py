@@ -120,10 +120,10 @@ class BroadModel:
         )
 
     @cached_property
-    def halves(self) -> tuple[Course, Course]:
-        """Course driven by each half of the samples of the pressure."""
+    def halves(self) -> tuple[Course, ...]:
+        """Course driven by each half of the samples of the pressure, or by both if they agree."""
         even, odd = self.record.halves
-        return self.course(even), self.course(odd)
+        return tuple(map(self.course, (even,) if np.array_equal(even, odd) else (even, odd)))
 
     @cached_property
     def _room(self) -> NDArray[np.float64]:
@@ -146,10 +146,10 @@ class BroadModel:
     def readings(self, at: Coordinates) -> NDArray[np.float64]:
         """Return the readings of the stem's sensor, m, one per cell, by each half: (2, c)."""
         place = Place(**at)
-        readings = np.empty((2, self.record.position.size))
+        readings = np.empty((len(self.halves), self.record.position.size))
         for course, row in zip(self.halves, readings, strict=True):
             read_stem(course, place, self.record.cells, row)
-        return readings
+        return np.broadcast_to(readings, (2, readings.shape[1]))
 
     def sensitivity(
         self, at: Coordinates, names: tuple[str, ...], readings: NDArray[np.float64]
@@ -184,8 +184,9 @@ class BroadModel:
         shape = (2, self.record.force.size, len(names))
         room = self._room[: math.prod(shape)].reshape(shape)
         slopes = np.empty((2, self.record.position.size, len(names)))
-        for course, rows in zip(self.halves, slopes, strict=True):
+        for course, rows in zip(self.halves, slopes, strict=False):
             read_slopes(course, Place(**at), coordinates, turned, self.record.cells, room, rows)
+        slopes[len(self.halves) :] = slopes[0]
         return slopes.transpose(0, 2, 1)
 
     def step(self, at: Coordinates, name: str) -> float:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from valve_friction_ros.model.compiled import compiled
 from valve_friction_ros.model.linear_motion import Dynamics
 from valve_friction_ros.model.stem_run import run_stem
-from valve_friction_ros.model.stem_tangent import Tangent, no_tangent
+from valve_friction_ros.model.stem_tangent import FORGOTTEN, Tangent, no_tangent
 
 _LEAST_LAG = 1e-9
 _LARGEST_ASYMMETRY = 0.9
@@ -102,22 +102,26 @@ _OF_FRICTION = (_COULOMB, _ALONG_TRAVEL, _IN_RECORD, _AT_LOW_SPEED)
 
 
 @compiled
-def _lag(signal: NDArray[np.float64], lag: float, period: float) -> None:
-    """Pass a signal, linear between its samples, through a first-order lag.
+def _lag(signals: NDArray[np.float64], lag: float, period: float) -> None:
+    """Pass signals, shape (g, p) and linear between their samples, through a first-order lag.
 
-    Before its first sample the signal is extrapolated by its first slope: a record may begin in the
-    middle of a move.
+    Before its first sample a signal is extrapolated by its first slope: a record may begin in the
+    middle of a move. A lag of `_LEAST_LAG` or less is none.
     """
+    if lag <= _LEAST_LAG:
+        return
     decay = math.exp(-period / lag)
     newest = 1.0 - lag * (1.0 - decay) / period
-    before = signal[0]
-    lagged = signal[0] - lag * (signal[1] - signal[0]) / period
-    signal[0] = lagged
-    for step in range(1, signal.size):
-        after = signal[step]
-        lagged = decay * lagged + newest * after + (1.0 - decay - newest) * before
-        signal[step] = lagged
-        before = after
+    before = signals[0].copy()
+    for one in range(before.size):
+        signals[0, one] = before[one] - lag * (signals[1, one] - before[one]) / period
+    for step in range(1, signals.shape[0]):
+        for one in range(before.size):
+            after = signals[step, one]
+            lagged = decay * signals[step - 1, one] + newest * after
+            lagged += (1.0 - decay - newest) * before[one]
+            signals[step, one] = lagged if abs(lagged) > FORGOTTEN else 0.0
+            before[one] = after
 
 
 @compiled
@@ -194,21 +198,11 @@ def _tangent(
     """Differentiate the drive of the stem and its start by some coordinates."""
     tangent = no_tangent(coordinates.size, room[0], room[1])
     constants, shares = _constants(at, course.travel), _shares(course, at)
-    signals = np.empty((shares.shape[1], course.force.size))
-    lagged = signals[4]
+    lagged = np.empty_like(course.force)
     if at.force_lag >= 0.0:
         _lag_slope(course.force, at.force_lag, course.period, lagged)
     else:
         _lead_slope(course.force, course.period, lagged)
-    for step in range(course.force.size):
-        place, age = course.place[step], course.age[step]
-        square = place * place
-        signals[0, step] = 1.0
-        signals[1, step] = square - 1.0 / 3.0
-        signals[2, step] = place * (square - 0.6)
-        signals[3, step] = signals[6, step] = age
-        signals[5, step] = place
-        signals[7, step] = course.slowness[step]
     for one, coordinate in enumerate(coordinates):
         row = constants[coordinate]
         tangent.mass[one], tangent.spring_constant[one] = row[0], row[1]
@@ -217,11 +211,24 @@ def _tangent(
         tangent.upward[one], tangent.downward[one] = row[5], row[6]
         tangent.stribeck_velocity[one] = row[8]
         tangent.of_friction[one] = 1.0 if coordinate in _OF_FRICTION else 0.0
-        for index in range(signals.shape[0]):
-            share = shares[coordinate, index]
-            if share != 0.0:
-                for step in range(signals.shape[1]):
-                    tangent.signals[step, one] += share * signals[index, step]
+    for step in range(course.force.size):
+        place, age = course.place[step], course.age[step]
+        square = place * place
+        signals = (
+            1.0,
+            square - 1.0 / 3.0,
+            place * (square - 0.6),
+            age,
+            lagged[step],
+            place,
+            age,
+            course.slowness[step],
+        )
+        for one, coordinate in enumerate(coordinates):
+            total = 0.0
+            for index, signal in enumerate(signals):
+                total += shares[coordinate, index] * signal
+            tangent.signals[step, one] = total
     return tangent
 
 
@@ -245,8 +252,7 @@ def drive_stem(
     bent = at.spring_constant * at.presliding
     for step in range(force.size):
         force[step] = course.force[step]
-    if at.force_lag > _LEAST_LAG:
-        _lag(force, at.force_lag, course.period)
+    _lag(force.reshape(-1, 1), at.force_lag, course.period)
     grip = np.empty_like(force)
     for step in range(force.size):
         place, age = course.place[step], course.age[step]
@@ -314,8 +320,7 @@ def read_stem(
         for step in range(force.size):
             held, _ = _held(at, force[step], positions[step], velocities[step])
             positions[step] += at.presliding * held
-    if at.stem_lag > _LEAST_LAG:
-        _lag(positions, at.stem_lag, course.period)
+    _lag(positions.reshape(-1, 1), at.stem_lag, course.period)
     shift = at.delay / course.period
     last = force.size - 2
     for cell in range(cells.size):
@@ -336,7 +341,12 @@ def _bend(
     tangent: Tangent,
 ) -> None:
     """Add the bend of the bristle to the positions and to their derivatives."""
-    found = tangent.positions
+    found, bristle = tangent.positions, -1
+    for one, coordinate in enumerate(coordinates):
+        if coordinate == _PRESLIDING:
+            bristle = one
+    if bristle < 0 and at.presliding == 0.0:
+        return
     for step in range(force.size):
         held, share = _held(at, force[step], positions[step], velocities[step])
         if share > 0.0:
@@ -347,9 +357,8 @@ def _bend(
                 pull -= at.spring_constant * found[step, one]
                 full = tangent.coulomb_friction[one] + tangent.slip_force[one]
                 found[step, one] += share * (pull - held * full)
-        for one in range(coordinates.size):
-            if coordinates[one] == _PRESLIDING:
-                found[step, one] += held
+        if bristle >= 0:
+            found[step, bristle] += held
         positions[step] += at.presliding * held
 
 
@@ -419,17 +428,11 @@ def read_slopes(
     positions, velocities = np.empty_like(force), np.empty_like(force)
     tangent = _tangent(course, at, coordinates, room)
     drive_stem(course, at, force, positions, velocities, tangent)
-    bends = at.presliding != 0.0
-    for coordinate in coordinates:
-        bends = bends or coordinate == _PRESLIDING
-    if bends:
-        _bend(at, force, coordinates, positions, velocities, tangent)
+    _bend(at, force, coordinates, positions, velocities, tangent)
     slow = np.zeros_like(force)
     _lag_slope(positions, at.stem_lag, course.period, slow)
-    if at.stem_lag > _LEAST_LAG:
-        for one in range(coordinates.size):
-            _lag(tangent.positions[:, one], at.stem_lag, course.period)
-        _lag(positions, at.stem_lag, course.period)
+    _lag(tangent.positions, at.stem_lag, course.period)
+    _lag(positions.reshape(-1, 1), at.stem_lag, course.period)
     late = np.empty(positions.size - 1)
     for step in range(late.size):
         late[step] = (positions[step] - positions[step + 1]) / course.period

@@ -12,6 +12,7 @@
 import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from sys import float_info
 from typing import NamedTuple
 
 import numpy as np
@@ -390,7 +391,7 @@ def _slow_view(
     calmer = _averaged_twice(velocity, longest) if longest > length else velocity
     lowest, highest = float(stem.min()), float(stem.max())
     return SlowView(
-        (2.0 * stem - lowest - highest) / max(highest - lowest, np.finfo(float).tiny),
+        (2.0 * stem - lowest - highest) / max(highest - lowest, float_info.min),
         np.linspace(-1.0, 1.0, stem.size, dtype=np.float64),
         np.abs(velocity),
         np.exp(-np.abs(calmer) / LOW_SPEED),

@@ -26,6 +26,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
+from sys import float_info
 
 import numpy as np
 from numpy.typing import NDArray
@@ -126,7 +127,6 @@ _LEAST_SCATTER = 1e-3
 _FLAT = 1e-3
 """Precision of a prior that leaves a spring of ten times the slope of the whole record open."""
 
-_TINY = float(np.finfo(float).tiny)
 _OPEN_SLIP = 0.3
 """Half width of F_c over a slip force: it lies anywhere between what is left of it at the speeds of
 the record and none, half of it in the mean, and evenly (half of 1/√3)."""
@@ -246,7 +246,7 @@ def _curve_of(posterior: Posterior) -> FrictionCurve:
         posterior.stribeck,
         regression.later(solved),
         posterior.inflation,
-        1.0 - solved.misfit / max(float(np.std(averages.force[0][averages.taken])), _TINY),
+        1.0 - solved.misfit / max(float(np.std(averages.force[0][averages.taken])), float_info.min),
         solved.misfit,
         regression.work.by_sample,
         correlation_of(gradients, solved.covariance),
@@ -339,7 +339,7 @@ def _by_strokes(
         stribeck_velocity=0.0,
         lag=0.0,
         inflation=1.0,
-        fit=1.0 - scatter / max(float(np.std(pressed)), _TINY),
+        fit=1.0 - scatter / max(float(np.std(pressed)), float_info.min),
         misfit=scatter,
         by_sample=larger_change(late_by, max(force.period, stem.period)),
     )
@@ -398,7 +398,7 @@ def _of_any(log_likelihoods: Sequence[_Array]) -> _Array:
     """
     parts = [np.exp(log) / np.sum(np.exp(log)) for log in log_likelihoods]
     together = sum(math.sqrt(float(part @ part)) * part for part in parts)
-    return np.asarray(np.log(np.maximum(together / np.max(together), np.finfo(float).tiny)))
+    return np.asarray(np.log(np.maximum(together / np.max(together), float_info.min)))
 
 
 def curve_numbers(curves: Sequence[FrictionCurve]) -> dict[str, Estimated]:

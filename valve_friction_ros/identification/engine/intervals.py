@@ -12,6 +12,7 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from sys import float_info
 
 import numpy as np
 from numpy.typing import NDArray
@@ -87,7 +88,7 @@ def _sliding(model: BroadModel, at: Coordinates, asymmetry: float) -> ReportedNu
         "at_low_speed": dry * low,
         "slip_force": falling,
     }
-    net = abs(float(np.sum(velocity))) / max(float(np.sum(speed)), np.finfo(float).tiny)
+    net = abs(float(np.sum(velocity))) / max(float(np.sum(speed)), float_info.min)
     return ReportedNumber(value, gradient, asymmetry * dry * net)
 
 

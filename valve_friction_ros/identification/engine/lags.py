@@ -19,6 +19,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from sys import float_info
 
 import numpy as np
 from numpy.typing import NDArray
@@ -168,7 +169,7 @@ def mixture_half_width(
     low, high = 0.0, 20.0 * math.sqrt(spread)
     some = weights > _NEGLIGIBLE
     weight, away = weights[some], centre - values[some]
-    deviation = np.maximum(deviations[some], np.finfo(float).tiny)
+    deviation = np.maximum(deviations[some], float_info.min)
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
         inside = normal((away + middle) / deviation) - normal((away - middle) / deviation)

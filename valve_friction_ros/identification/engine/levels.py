@@ -15,6 +15,7 @@ of a move, but none of a level.
 """
 
 import math
+from sys import float_info
 from typing import NamedTuple
 
 import numpy as np
@@ -202,6 +203,6 @@ def _curve(levels: _Levels, step: float) -> FrictionCurve | None:
         stribeck_velocity=0.0,
         lag=0.0,
         inflation=1.0,
-        fit=1.0 - scatter / max(float(np.std(force)), np.finfo(float).tiny),
+        fit=1.0 - scatter / max(float(np.std(force)), float_info.min),
         misfit=scatter,
     )

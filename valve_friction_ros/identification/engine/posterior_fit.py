@@ -12,6 +12,7 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from sys import float_info
 from typing import NamedTuple
 
 import numpy as np
@@ -155,7 +156,7 @@ class PosteriorFit:
     def along_lag(self) -> NDArray[np.float64]:
         """Change of each free coordinate per second of lag, by the same model, shape (p,)."""
         along = self.covariance @ self.lags
-        return np.asarray(along / max(float(self.lags @ along), np.finfo(float).tiny))
+        return np.asarray(along / max(float(self.lags @ along), float_info.min))
 
 
 def lag_of(at: Coordinates) -> float:
@@ -182,19 +183,41 @@ def _common(own: NDArray[np.float64], cross: NDArray[np.float64]) -> NDArray[np.
     leaves less than `_LEAST_COMMON` of the information of one half alone, that share is kept.
     """
     values, vectors = np.linalg.eigh(own)
-    root = np.sqrt(np.maximum(values, max(1e-15 * float(values[-1]), np.finfo(float).tiny)))
+    root = np.sqrt(np.maximum(values, max(1e-15 * float(values[-1]), float_info.min)))
     shares, turned = np.linalg.eigh((vectors / root).T @ cross @ (vectors / root))
     back = (vectors * root) @ turned
     return np.asarray((back * np.clip(shares, _LEAST_COMMON, 1.0)) @ back.T, dtype=np.float64)
 
 
-def _products(rows: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Multiply a matrix by its transpose, block by block.
+class _Information(NamedTuple):
+    """Products of weighted derivatives: of each half with itself, of one with the other, (p, p).
 
-    For larger blocks NumPy's library starts threads, which wait for one another on a busy machine.
+    Then those of the derivatives of one half with the residual of the other, shape (p,).
     """
-    blocks = np.array_split(rows, max(rows.shape[1] // _BLOCK, 1), axis=1)
-    return np.asarray(np.sum([block @ block.T for block in blocks], axis=0))
+
+    own: NDArray[np.float64]
+    cross: NDArray[np.float64]
+    gradient: NDArray[np.float64]
+
+
+def _information(
+    slopes: NDArray[np.float64], scaled: NDArray[np.float64], weights: NDArray[np.float64]
+) -> _Information:
+    """Multiply derivatives, (2, p, c), by themselves and by the `scaled` residuals, (2, c).
+
+    This is done block by block. For larger blocks NumPy's library starts threads, which wait for
+    one another on a busy machine.
+    """
+    size, cells = slopes.shape[1:]
+    same, apart, gradient = np.zeros((size, size)), np.zeros((size, size)), np.zeros(size)
+    for begin in range(0, cells, _BLOCK):
+        block = slice(begin, begin + _BLOCK)
+        even, odd = slopes[:, :, block] * weights[block]
+        total, difference = even + odd, even - odd
+        same += total @ total.T
+        apart += difference @ difference.T
+        gradient += even @ scaled[1, block] + odd @ scaled[0, block]
+    return _Information(0.25 * (same + apart), 0.25 * (same - apart), 0.5 * gradient)
 
 
 class _Problem:
@@ -222,9 +245,8 @@ class _Problem:
         self.distance = np.array([at[name] - centre.get(name, 0.0) for name in names])
         self.jacobian = jacobian(at, names)
         size = np.abs(np.diag(self.jacobian))
-        even, odd = model.sensitivity(at, names, readings) * model.weights
-        same, apart = _products(even + odd), _products(even - odd)
-        own, cross = 0.25 * (same + apart), 0.25 * (same - apart)
+        slopes = model.sensitivity(at, names, readings)
+        own, cross, gradient = _information(slopes, scaled, model.weights)
         precision = np.diag(self.precision * size**2)
         pull = -self.precision * size * self.distance
         if pinned is not None:
@@ -236,8 +258,7 @@ class _Problem:
         outer = np.outer(self.scale, self.scale) * self.inflation
         information = _common(own / outer, cross / outer)
         self.curvature = information + precision / np.outer(self.scale, self.scale)
-        gradient = 0.5 * np.sum(even * scaled[1] + odd * scaled[0], axis=1) / self.inflation
-        self.slope = (gradient + pull) / self.scale
+        self.slope = (gradient / self.inflation + pull) / self.scale
         self.straight = straight(at, names)
         lowest = [BOUNDS.get(name, -np.inf) - self.straight[name] for name in names]
         self.lowest = np.minimum(np.array(lowest) * self.scale, 0.0)
@@ -351,11 +372,13 @@ def fit(
         if problem.gain(problem.step(0.0)) < _WORTH:
             break
         move = _descended(problem)
-        problem = _Problem(model, move.at, names, deviations, centre, move.readings, pinned)
         risen = 0 if best.objective(move.at, move.readings) < best.here else risen + 1
+        if risen > rises:
+            break
+        problem = _Problem(model, move.at, names, deviations, centre, move.readings, pinned)
         if not risen:
             best, passed = problem, passed + 1
-        if risen > rises or abs(move.fall) < _WORTH:
+        if abs(move.fall) < _WORTH:
             break
     problem = best
     remaining = problem.jacobian @ problem.step(0.0)

@@ -11,6 +11,7 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from sys import float_info
 from typing import NamedTuple
 
 import numpy as np
@@ -45,7 +46,6 @@ _MARGIN = 2.0
 """Distance of an average from a rest or a reversal, in averaging lengths, at which the stem clearly
 slides."""
 
-_TINY = float(np.finfo(float).tiny)
 
 _SURE_MOVE, _OF_RANGE, _LARGEST_MOVE = 6.0, 5e-3, 0.25
 """Least move that has a speed, in deviations of the noise of a move and as a share of the stem's
@@ -184,7 +184,7 @@ class MeasuredSignal(NamedTuple):
             unsteady = float(np.quantile(np.abs(np.diff(raw)), _QUARTILE)) / _QUARTER_MAGNITUDE
             noise = max(white, min(unsteady / math.sqrt(3.0), math.sqrt(2.0) * noise))
             demanded = min(_SURE_MOVE * noise, _LARGEST_MOVE * range_)
-            sure = np.abs(left) >= max(demanded, _OF_RANGE * range_, _TINY)
+            sure = np.abs(left) >= max(demanded, _OF_RANGE * range_, float_info.min)
             covered += float(np.sum(np.abs(left[sure])))
             squares += float(np.sum((left[sure] ** 2 - white**2) / times[sure]))
             left, times = np.where(sure, 0.0, left), np.where(sure, 0.0, times)
@@ -283,7 +283,7 @@ def averages_of(
     velocity = [np.gradient(half, step) for half in position]
     mean = 0.5 * (velocity[0] + velocity[1])
     size = np.abs(mean)
-    speed = 2.0 * float(np.sum(size**2) / max(np.sum(size), _TINY))
+    speed = 2.0 * float(np.sum(size**2) / max(np.sum(size), float_info.min))
     per_average = [max(averaging_time / one.period, 1.0) for one in (force, stem)]
     noise = {
         "force": force.noise * math.sqrt(2.0 / (3.0 * per_average[0])),
@@ -387,7 +387,7 @@ def _path(halves: Sequence[_Array], force: _Array, noise: float) -> _Path:
     real, of_long = 1.0, float(np.sum(work[~is_short]))
     if short > 0.0 and of_long > 0.0:
         real = min(max(float(np.sum(work[is_short])) / short * long / of_long, 0.0), 1.0)
-    distance = max(whole - (1.0 - real) * short, _TINY)
+    distance = max(whole - (1.0 - real) * short, float_info.min)
     deviation = math.sqrt(real * (1.0 - real)) * short
     return _Path(distance, deviation, max(lengths.size, 1), float(np.sum(work)))
 
@@ -400,7 +400,7 @@ def least_stroke(position: _Array, noise: float) -> float:
 def _off_line(force: _Array, position: _Array) -> _Array:
     """Return a force minus its straight-line fit along the travel."""
     away, force = position - np.mean(position), force - np.mean(force)
-    square = max(float(away @ away), _TINY)
+    square = max(float(away @ away), float_info.min)
     return np.asarray(force - float(away @ force) / square * away)
 
 

@@ -12,6 +12,7 @@
 import math
 from collections.abc import Container, Mapping
 from dataclasses import replace
+from sys import float_info
 from typing import NamedTuple
 
 import numpy as np
@@ -67,7 +68,7 @@ def choose_threshold(sweep: Sweep, window: int) -> int:
             f"no threshold leaves enough samples in motion to determine {sweep.free} parameters: "
             "record more strokes, or fix a parameter"
         )
-    floor = _RESOLUTION * max(float(np.nanmax(sweep.sigma)), np.finfo(float).tiny)
+    floor = _RESOLUTION * max(float(np.nanmax(sweep.sigma)), float_info.min)
     criterion = 2 * sweep.free * np.log(np.maximum(sweep.sigma, floor)) - sweep.log_information
     return int(np.argmin(np.where(usable, criterion, np.inf)))
 

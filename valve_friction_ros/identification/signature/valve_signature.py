@@ -11,6 +11,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from sys import float_info
 from typing import NamedTuple
 
 import numpy as np
@@ -90,7 +91,7 @@ def _fit(
     """
     span = float(time[-1] - time[0])
     shortest = span / time.size
-    scale = max(float(np.ptp(position)), np.finfo(float).tiny)
+    scale = max(float(np.ptp(position)), float_info.min)
 
     def misfit(place: NDArray[np.float64]) -> NDArray[np.float64]:
         columns = _columns(time, place[0], float(np.exp(place[1])), growth, jumps)

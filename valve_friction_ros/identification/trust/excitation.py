@@ -15,6 +15,7 @@ high, graphite and stribeck), which all determine the friction, and records that
 """
 
 import math
+from sys import float_info
 from typing import NamedTuple
 
 import numpy as np
@@ -275,7 +276,7 @@ def _followed(recording: Recording) -> _Followed:
     total = float(np.sum((target - target.mean()) ** 2))
     share = 1 - float(left @ left) / total if total > 0 else 0.0
     away = columns[:, 0]
-    along = float(away @ target) / max(float(away @ away), np.finfo(float).tiny)
+    along = float(away @ target) / max(float(away @ away), float_info.min)
     # From the samples, not the blocks: blocks lose the phase of a stem that swings fast.
     between = [0.5 * (one[1:] + one[:-1]) for one in (recording.position, recording.drive)]
     off_line = between[1] - target.mean() - along * (between[0] - place.mean())

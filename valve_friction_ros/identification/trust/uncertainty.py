@@ -13,6 +13,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from statistics import NormalDist
+from sys import float_info
 from typing import NamedTuple, TypedDict, TypeVar
 
 import numpy as np
@@ -211,7 +212,7 @@ allows."""
 def mean_over_distance(values: NDArray[np.float64], velocity: NDArray[np.float64]) -> float:
     """Mean of `values` over the distance that the stem slides at `velocity`, m/s; 0 at rest."""
     speed = np.abs(velocity)
-    return float(np.sum(values * speed) / max(float(np.sum(speed)), np.finfo(float).tiny))
+    return float(np.sum(values * speed) / max(float(np.sum(speed)), float_info.min))
 
 
 def mean_speed(velocity: NDArray[np.float64]) -> float:
