@@ -321,7 +321,8 @@ class _Identifier:
     """Time for which the next request shelves an alarm, at most 720, or takes it out of service
     [h]."""
     valve_tag = Setting("", read_only=True)
-    """Tag of the valve, hardware_id of its diagnostics [-]; empty: the namespace."""
+    """Tag of the valve, hardware_id of its diagnostics [-]; empty: the namespace, or the
+    name of the node without one."""
     history_file = Setting(str(history_file()), read_only=True)
     """File in which identifications and baselines are stored [-]; empty: nowhere."""
     history_url = Setting("", read_only=True)

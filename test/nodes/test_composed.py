@@ -44,6 +44,7 @@ from type_description_interfaces.srv import GetTypeDescription
 
 from valve_friction_ros.health import identify_with_numbers
 from valve_friction_ros.health.friction_monitor import MOST_SAMPLES
+from valve_friction_ros.history import HistoryFile
 from valve_friction_ros.identification import identify
 from valve_friction_ros.model import BENCH_VALVE
 from valve_friction_ros.nodes import Dashboard, PressureSource, Simulator, StrokePlayer
@@ -285,20 +286,31 @@ def held(monkeypatch):
     released.set()
 
 
-def test_a_result_of_another_valve_is_refused(live, compose, held):
-    """It raised and ended alarms, and went into the history, with the parameters of this valve."""
-    client, node = live.client, compose()
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        ({"diaphragm_area": 0.09}, "the parameters of the valve were changed during"),
+        ({"use_sim_time": True}, "no time on /clock although use_sim_time is set"),
+    ],
+)
+def test_a_result_of_another_valve_or_without_a_date_is_refused(
+    live, compose, held, tmp_path, change, reason
+):
+    """It raised and ended alarms, and went into the history, as of this valve or of 1970."""
+    file = tmp_path / "history.sqlite"
+    client, node = live.client, compose(history_file=str(file))
     with spun(node, TurnExecutor(context=compose.context)):
         client.connect()
         client.fill(quick_record())
         asked = client.request(Trigger, f"{NODE}/identify", Trigger.Request())
         client.wait_until(held[0].is_set, "an identification")
-        client.set_parameters(NODE, {"diaphragm_area": 0.09})
+        client.set_parameters(NODE, change)
         held[1].set()
         answer = client.wait_until_answered(asked)
         assert not answer.success
-        assert "the parameters of the valve were changed during" in answer.message
+        assert reason in answer.message
         assert client.status_values()["estimate_valid"] == "false"
+    assert all(one.time > 1e18 for one in HistoryFile(file).entries())
 
 
 AWAITING = [TurnExecutor, SingleThreadedExecutor, MultiThreadedExecutor]
@@ -446,6 +458,14 @@ def test_each_topic_and_service_has_a_meaning(node, some):
             assert f"```{{node-graph}} {node} {kind}\n" in page
             text = graph_as_markdown(node, kind)
             assert all(name.rpartition("/")[2] in text for name in names)
+
+
+def test_a_valve_without_a_namespace_is_called_as_its_node(compose):
+    named = {"context": compose.context, "parameter_overrides": overrides()}
+    node = Identifier(cli_args=["--ros-args", "-r", "__node:=kitchen_valve"], **named)
+    status = node.stuck_status("")
+    node.destroy_node()
+    assert (status.name, status.hardware_id) == ("/kitchen_valve: friction", "kitchen_valve")
 
 
 OTHER = "/fv_102"

@@ -238,6 +238,24 @@ def test_the_order_of_a_loaded_file_has_no_effect(client, beside, order):
         )
 
 
+def test_the_dump_of_a_node_in_another_namespace_can_be_loaded(client):
+    """It names the topics there, one parameter for each quality; each was refused."""
+    dumped = {
+        "window": 50.0,
+        "qos_overrides./fv_102/stem_state.subscription.depth": 10,
+        "qos_overrides./fv_102/stem_state.subscription.reliability": "reliable",
+    }
+    results = client.set_parameters(NODE, dumped)
+    ignored = "ignored, as the node does not have this topic"
+    assert [(one.successful, one.reason) for one in results] == [
+        (True, ""),
+        (True, ignored),
+        (True, ignored),
+    ]
+    assert client.set_together(NODE, dumped).successful
+    assert client.parameters(NODE, "window") == [50.0]
+
+
 @pytest.mark.parametrize("kind", [SetParameters, SetParametersAtomically])
 def test_a_value_of_unknown_type_is_refused(client, kind):
     """Such as of a client in another language; it was an internal error, and never answered."""

@@ -305,12 +305,17 @@ class HistoryWriter:
     async def keep(
         self, identified: IdentificationInput, refusal: RefusalError | None = None
     ) -> None:
-        """Store the identification that the monitor has just accepted, or the cause of refusal."""
+        """Store the identification that the monitor has just accepted, or the cause of refusal.
+
+        A refusal while simulated time has not started has no date, and is not stored.
+        """
         monitor, now = self._monitor, self._node.get_clock().now().nanoseconds
-        found = monitor.stamp if refusal is None else None
+        stamp = now if refusal is not None or monitor.stamp is None else monitor.stamp
+        if not stamp:
+            return
         days = self._node.get_parameter("history_days").value
         with self._failures_remembered():
-            entry = entry_of(monitor, self.valve, *identified, found or now, refusal)
+            entry = entry_of(monitor, self.valve, *identified, stamp, refusal)
             await self._written(lambda file: file.add(entry, days), identification=True)
 
     def kept_now(

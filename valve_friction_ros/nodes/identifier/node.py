@@ -193,7 +193,8 @@ class Identifier(ManagedNode):
         self.add_post_set_parameters_callback(self._take_parameters)
         self._shared_workers = workers
         self._status_name = f"{self.get_fully_qualified_name()}: friction"
-        self._tag = self.get_parameter("valve_tag").value or self.get_namespace().strip("/")
+        place = self.get_namespace().strip("/") or self.get_name()
+        self._tag = self.get_parameter("valve_tag").value or place
         self.begin()
 
     def await_others(self) -> None:

@@ -139,7 +139,7 @@ class ReportWriter:
         if (diagnosis := monitor.diagnosis()).alarm is not None:
             notes.append(f"an alarm from an earlier record is still active: {diagnosis.message}")
         facts = {
-            "name": history.valve.tag or self._node.get_name(),
+            "name": history.valve.tag,
             "source": f"node {self._node.get_fully_qualified_name()}, "
             f"identified {time:%Y-%m-%d %H:%M:%S} UTC",
             "dated": f"identified {time:%Y-%m-%d %H:%M} UTC",

@@ -32,6 +32,7 @@ from valve_friction_ros.identification.methods import compile_methods
 from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.model.compiled import find_cache, note_cache
 from valve_friction_ros.nodes.identifier.status import NumberTopics
+from valve_friction_ros.nodes.plumbing.polled_node import lack_of_time
 from valve_friction_ros.nodes.plumbing.processes import Processes
 from valve_friction_ros.nodes.plumbing.worker import InternalError, Worker, bugs_reported, done_in
 
@@ -193,8 +194,9 @@ class Identification:
         """Identify a record in the worker; adopt and publish the result.
 
         Raises RefusedRecordError if the record cannot be identified, is old or of a valve that has
-        since been changed, InternalError for a bug, which the monitor reports until an
-        identification succeeds. The findings of a refused record are adopted too.
+        since been changed, RefusalError if there is no time to date the result, and InternalError
+        for a bug, which the monitor reports until an identification succeeds. The findings of a
+        refused record are adopted too.
         """
         self._require_recent()
         self._is_running = True
@@ -214,13 +216,16 @@ class Identification:
                         "identify again once the buffer holds new strokes",
                         {},
                     )
+                if problem := lack_of_time(self._node):  # use_sim_time was set meanwhile
+                    raise RefusalError(problem)
                 now = self._node.get_clock().now().nanoseconds
                 self._monitor.accept(result, now, numbers)
                 self._results.publish(result, self._monitor)
                 message = self._monitor.diagnosis().message
                 self._node.get_logger().info(f"identified: {message}")
         except RefusedRecordError as refused:
-            self._monitor.learn(refused.numbers, self._node.get_clock().now().nanoseconds)
+            if not lack_of_time(self._node):
+                self._monitor.learn(refused.numbers, self._node.get_clock().now().nanoseconds)
             raise
         except InternalError as error:
             self._monitor.internal_error = str(error)

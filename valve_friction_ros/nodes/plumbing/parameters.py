@@ -14,7 +14,7 @@ import functools
 import itertools
 import math
 import sys
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from typing import Any
 
 from rcl_interfaces import msg, srv
@@ -199,21 +199,31 @@ def reject_invalid(
     node.add_on_set_parameters_callback(check)
 
 
-def _changes(node: Node, messages: Iterable[msg.Parameter]) -> list[Parameter | str]:
-    """Return the parameters of a request, and for those that nobody can set the reason."""
-    known = node.list_parameters([], 0).names
-    changes: list[Parameter | str] = []
+def _changes(
+    node: Node, messages: Iterable[msg.Parameter]
+) -> Iterator[Parameter | SetParametersResult]:
+    """Yield the parameters of a request, and the results of those that nobody can set.
+
+    A quality of service for a topic that the node does not have is ignored, as it is at the start:
+    the dump of a node in one namespace can then be loaded in another.
+    """
     for one in messages:
         if not node.has_parameter(one.name):
-            reason = f"{node.get_name()} has no parameter {one.name!r}: {nearest(one.name, known)}"
-            changes.append(reason)
+            is_ignored = one.name.startswith("qos_overrides.")
+            hint = nearest(one.name, node.list_parameters([], 0).names)
+            yield SetParametersResult(
+                successful=is_ignored,
+                reason="ignored, as the node does not have this topic"
+                if is_ignored
+                else f"{node.get_name()} has no parameter {one.name!r}: {hint}",
+            )
             continue
         try:
-            changes.append(Parameter.from_parameter_msg(one))
+            yield Parameter.from_parameter_msg(one)
         except ValueError:
             kinds = ", ".join(f"{kind.value} {kind.name.lower()}" for kind in Parameter.Type)
-            changes.append(f"{one.name}: there is no type {one.value.type}: choose from {kinds}")
-    return changes
+            reason = f"{one.name}: there is no type {one.value.type}: choose from {kinds}"
+            yield SetParametersResult(successful=False, reason=reason)
 
 
 def set_together(
@@ -222,11 +232,13 @@ def set_together(
     response: srv.SetParametersAtomically.Response,
 ) -> srv.SetParametersAtomically.Response:
     """Answer ``~/set_parameters_atomically``: set all parameters or none."""
-    changes = _changes(node, request.parameters)
-    if reasons := [one for one in changes if isinstance(one, str)]:
+    changes = [*_changes(node, request.parameters)]
+    wanted = [one for one in changes if isinstance(one, Parameter)]
+    told = [one for one in changes if not isinstance(one, Parameter)]
+    if reasons := [one.reason for one in told if not one.successful]:
         response.result = SetParametersResult(successful=False, reason="; ".join(reasons))
     else:
-        response.result = node.set_parameters_atomically(changes)
+        response.result = node.set_parameters_atomically(wanted)
     return response
 
 
@@ -241,10 +253,10 @@ def set_each(
     results: dict[int, SetParametersResult] = {}
     left: dict[int, Parameter] = {}
     for number, change in enumerate(_changes(node, request.parameters)):
-        if isinstance(change, str):
-            results[number] = SetParametersResult(successful=False, reason=change)
-        else:
+        if isinstance(change, Parameter):
             left[number] = change
+        else:
+            results[number] = change
     free = [
         number for number, one in left.items() if not node.describe_parameter(one.name).read_only
     ]
