@@ -86,7 +86,7 @@ class TestSentOnChange:
         return StampedSignal(time, 1e-3 * place)
 
     def test_it_stands_until_it_jumps(self, stem):
-        found = as_sent_on_change(stem)
+        found = as_sent_on_change(stem, sent_dead_band(stem))
         added = np.setdiff1d(found.time, stem.time)
         assert added.size == 12
         for time in added:
@@ -97,13 +97,15 @@ class TestSentOnChange:
     def test_what_is_sent_by_the_clock_is_as_it_was(self):
         time = np.arange(500) * 0.01
         signal = StampedSignal(time, 1e-3 * np.sign(np.sin(time)))
-        assert as_sent_on_change(signal) is signal
+        assert sent_dead_band(signal) == 0.0
+        assert as_sent_on_change(signal, 0.0) is signal
 
     def test_lost_samples_are_no_dead_band(self):
         """A ramp of which every tenth sample, and half a second, is lost."""
         kept = np.array([k for k in range(1000) if k % 10 and not 300 < k < 350])
         signal = StampedSignal(0.01 * kept, 1e-4 * kept)
-        assert as_sent_on_change(signal) is signal
+        assert sent_dead_band(signal) == 0.0
+        assert as_sent_on_change(signal, 0.0) is signal
 
     @pytest.mark.parametrize("band", [0.002, 0.01, 0.03])
     def test_its_dead_band_is_the_least_change(self, band):

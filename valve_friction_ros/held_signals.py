@@ -61,6 +61,8 @@ class Pauses(NamedTuple):
     is_long: NDArray[np.bool_]
     is_usual: NDArray[np.bool_]
     """Whether the signal goes on with a usual step, as one that rested does."""
+    bunches: int
+    """Number of bunches that the samples come in, pauses of one length apart; else 0."""
     is_telling: bool
     """Whether that means a rest: usual steps are small, and samples do not come in bunches."""
 
@@ -71,13 +73,13 @@ class Pauses(NamedTuple):
         scan = float(np.quantile(length, _SCAN, method="lower"))
         is_long = length > LONG_PAUSE * scan
         most = _STEPS * float(np.quantile(steps if is_long.all() else steps[~is_long], _USUAL))
-        is_telling = 2.0 * most < float(np.ptp(values))
-        where = np.flatnonzero(is_long)
+        where, bunches = np.flatnonzero(is_long), 0
         if where.size >= FEWEST_BUNCHES:
             both = length[where], np.diff(where)
             alike = all(np.ptp(one) <= _ALIKE * np.median(one) for one in both)
-            is_telling &= not (alike and np.median(both[1]) > 1)
-        return cls(length, scan, is_long, steps <= most, is_telling)
+            bunches = where.size + 1 if alike and np.median(both[1]) > 1 else 0
+        is_telling = not bunches and 2.0 * most < float(np.ptp(values))
+        return cls(length, scan, is_long, steps <= most, bunches, is_telling)
 
     @property
     def silences(self) -> NDArray[np.bool_]:
@@ -150,14 +152,12 @@ def _shortest(pauses: NDArray[np.float64]) -> float:
     return float(np.quantile(pauses, _FEW_SHORTER))
 
 
-def as_sent_on_change(signal: StampedSignal) -> StampedSignal:
+def as_sent_on_change(signal: StampedSignal, least: float) -> StampedSignal:
     """Hold each value of a signal that is sent on change until just before the next jump.
 
-    A source with a dead band is silent while its value hardly changes. A straight line over such a
-    pause would move a stem that sticks while the force on it grows. Other signals are returned
-    unchanged.
+    A source with a dead band (`sent_dead_band`), `least`, is silent while its value hardly changes.
+    A straight line over such a pause would move a stem that sticks while the force on it grows.
     """
-    least = sent_dead_band(signal)
     if least == 0.0:
         return signal
     pauses, steps = np.diff(signal.time), np.abs(np.diff(signal.value))

@@ -529,8 +529,9 @@ def measured(recording: Recording) -> MeasuredRecord:
         recording.drive,
         recording.position,
         recording.start_time,
-        driven_by=recording.driven_by,
-        gap=recording.gap,
+        recording.stamped,
+        recording.driven_by,
+        recording.gap,
     )
 
 

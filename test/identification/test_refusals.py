@@ -119,6 +119,21 @@ def test_sampling_too_slow():
     refused(slow, r"^sampling is too slow for the motion: .* apart; sample faster")
 
 
+def test_sampling_too_slow_because_only_changes_are_sent():
+    """It advised to sample faster a source that sends each change."""
+    time = np.cumsum(1.0 + np.random.default_rng(2).exponential(12.0, 80))
+    up = np.arange(80) % 2
+    signals = [
+        StampedSignal(time, low + up * (high - low)) for low, high in ((7e4, 16e4), (5e-3, 2e-2))
+    ]
+    grid = np.arange(time[0], time[-1], 10.0)
+    values = [np.interp(grid, one.time, one.value) for one in signals]
+    record = Recording(10.0, *values, stamped=StampedRecord(*signals))
+    slow = "^the stem jumps from sample to sample, .*: export it without compression, sample faster"
+    with pytest.raises(RefusalError, match=slow):
+        identify_plant(record, BENCH_VALVE, SETTINGS)
+
+
 def test_pressure_of_a_dead_sensor(healthy):
     still = Recording(PERIOD, np.full(len(healthy), 1e5), healthy.position)
     refused(still, "^the pressure did not change.*check the pressure sensor", SensorNoise(10e-6))

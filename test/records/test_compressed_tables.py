@@ -195,6 +195,7 @@ def test_after_a_bad_value_nothing_is_known_until_the_next(export):
     assert "'FV-7.ZT' is compressed" in str(found.notes)
     steps = np.diff(found.recording().stamped.position.time)
     np.testing.assert_allclose(steps[np.abs(steps - 1.0) > 1e-6], 56.0)
+    assert "gap of 56 s" in found.recording().gap  # it was a rest, as the stem goes on where it was
 
 
 def test_bunches_are_not_compressed(export):

@@ -231,6 +231,7 @@ def _recorded(
                 f"{table.clock_of(by_name[gap.name].signal)!r}: gap of "
                 f"{lasting(gap.seconds)}: {gap.remedy(WITHOUT_GAP)}"
             ),
+            (drives[0].bad_at, stem.bad_at),
         )
     except RefusalError as refusal:
         raise RefusalError(f"{table.name}: {refusal}") from None

@@ -339,6 +339,8 @@ More than half of the grid would be interpolated, and the noise, a median, would
 _LONGEST_SILENCE = 600_000_000_000
 """Longest pause, ns, in which a sensor that sends only on change may be silent: ten minutes."""
 
+_NEVER = np.empty(0, np.int64)
+
 _ON_GRID = 1e-3
 """Distance of a stamp from the grid, as a share of its period, up to which the stamp is on it.
 
@@ -395,16 +397,20 @@ class Gap:
         return f"{self.what}: {self.remedy(usual)}"
 
 
-def _gap(name: str, samples: Samples, period: int) -> Gap | None:
-    pauses = np.diff(samples.stamps)
-    pauses[Pauses.of(*samples).silences & (pauses <= _LONGEST_SILENCE)] = 0
+def _gap(name: str, samples: Samples, period: int, bad_at: NDArray[np.int64]) -> Gap | None:
+    """Return the longest gap, if any; a pause after a bad value, at `bad_at`, is no silence."""
+    judged = Pauses.of(*samples)
+    pauses = judged.length.copy()
+    silent = judged.silences & (pauses <= _LONGEST_SILENCE)
+    after_bad = np.searchsorted(samples.stamps, bad_at) - 1
+    silent[after_bad[(after_bad >= 0) & (after_bad < silent.size)]] = False
+    pauses[silent] = 0
     longest = int(np.argmax(pauses))
     if pauses[longest] <= LONG_PAUSE * period:
         return None
     since_start = float(samples.stamps[longest] - samples.stamps[0]) / 1e9
     whole = float(samples.stamps[-1] - samples.stamps[0])
     gaps = pauses[pauses > LONG_PAUSE * period]
-    is_regular = gaps.size >= FEWEST_BUNCHES and 2 * np.median(gaps) > gaps.max()
     return Gap(
         name,
         longest + 1,
@@ -412,7 +418,7 @@ def _gap(name: str, samples: Samples, period: int) -> Gap | None:
         since_start,
         float(np.sum(gaps)) / whole,
         gaps.size,
-        gaps.size + 1 if is_regular else 0,
+        judged.bunches,
     )
 
 
@@ -433,6 +439,7 @@ def uniform_recording(
     names: tuple[str, str] = ("actuator_pressure", "stem_state"),
     driven_by: Drive = Drive.PRESSURE,
     refusal_of: Callable[[Gap], str] = str,
+    bad_at: tuple[NDArray[np.int64], NDArray[np.int64]] = (_NEVER, _NEVER),
 ) -> Recording:
     """Put drive and stem position on the time grid of the stem position.
 
@@ -452,6 +459,8 @@ def uniform_recording(
         Quantity of `drive`.
     refusal_of : callable
         Returns the refusal of a gap.
+    bad_at : tuple of ndarray of int, shape (n,)
+        Times of the bad values of each signal, ns, which were left out.
 
     Returns
     -------
@@ -468,7 +477,10 @@ def uniform_recording(
     """
     period_of_drive = _period(names[0], drive)
     period = _period(names[1], position)
-    either = _gap(names[0], drive, period_of_drive), _gap(names[1], position, period)
+    either = (
+        _gap(names[0], drive, period_of_drive, bad_at[0]),
+        _gap(names[1], position, period, bad_at[1]),
+    )
     gaps = [gap for gap in either if gap is not None]
     if gaps and (most := max(gaps, key=lambda gap: gap.share)).is_most:
         raise RefusalError(refusal_of(most))

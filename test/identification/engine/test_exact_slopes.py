@@ -212,7 +212,7 @@ def model():
     stem = simulate(BENCH_VALVE, LOW_FRICTION, pressure, 0.01).position
     noise = np.random.default_rng(0).standard_normal((2, time.size))
     recording = Recording(0.01, pressure + 20 * noise[0], stem + 2e-6 * noise[1])
-    record = fitted_record(stamped_record(recording), BENCH_VALVE)
+    record = fitted_record(stamped_record(recording)[0], BENCH_VALVE)
     return BroadModel(record, LOW_FRICTION.spring_constant)
 
 

@@ -293,7 +293,7 @@ def _require_enough(positions: int, inside: int) -> None:
     if positions < _FEWEST:
         raise RefusalError(
             f"the record has only {positions} positions, a repeated value taken once (at least "
-            f"{_FEWEST} are needed): record longer, or sample faster"
+            f"{_FEWEST} are needed): record longer, sample faster, or export it without compression"
         )
     if inside < _FEWEST:
         raise RefusalError(

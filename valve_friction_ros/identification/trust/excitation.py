@@ -21,6 +21,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from valve_friction_ros.held_signals import sent_dead_band
 from valve_friction_ros.identification.refusal import LittleMotionError, RefusalError
 from valve_friction_ros.identification.trust.plausible_units import position_question
 from valve_friction_ros.model.recording import Recording
@@ -140,6 +141,13 @@ def require_unbroken(recording: Recording) -> None:
         raise RefusalError(recording.gap)
 
 
+def _faster(recording: Recording, is_held: bool = False) -> str:
+    """Return what helps a record that is compressed beside faster sampling; else ''."""
+    own = recording.stamped
+    is_sent = own is not None and max(map(sent_dead_band, (own.drive, own.position))) > 0.0
+    return "export it without compression, " if is_held or is_sent else ""
+
+
 def require_motion(recording: Recording, travel: float = math.inf) -> None:
     """Refuse a recording whose stem did not move by more than its noise.
 
@@ -153,7 +161,7 @@ def require_motion(recording: Recording, travel: float = math.inf) -> None:
             raise RefusalError(
                 f"the stem jumps from sample to sample, {lasting(recording.sample_period)} apart "
                 f"(its position spans {span * 1e6:.3g} µm with {noise * 1e6:.3g} µm of noise or "
-                "unseen motion): sample faster, or check the stem sensor"
+                f"unseen motion): {_faster(recording)}sample faster, or check the stem sensor"
             )
         raise LittleMotionError(
             f"the stem did not move: its position spans {span * 1e6:.3g} µm with "
@@ -325,9 +333,8 @@ def require_related_signals(recording: Recording) -> None:
     is_glitch = bool(np.any(jumps[1:] * jumps[:-1] < 0))
     if is_glitch or np.sum(np.abs(jumps)) > _JUMPED * np.sum(np.abs(steps)):
         is_held = np.mean(steps[:-1][steps[1:] != 0.0] == 0.0) > _HELD
-        remedy = "export it without compression, " if is_held else ""
         raise RefusalError(
             f"sampling is too slow for the motion: the stem moves {100 * step / span:.0f} % of "
-            f"its range between two samples, {lasting(recording.sample_period)} apart; {remedy}"
-            "sample faster, or check the stem sensor for a glitch"
+            f"its range between two samples, {lasting(recording.sample_period)} apart; "
+            f"{_faster(recording, is_held)}sample faster, or check the stem sensor for a glitch"
         )
