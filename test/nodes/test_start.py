@@ -42,6 +42,13 @@ REFUSED = {  # node, parameters, words of the only line
         {"window": 60},
         "window: expected 'Type.DOUBLE' got 'Type.INTEGER': write 60.0",
     ),
+    "all at once": (
+        "identifier",
+        {"windw": 3.0, "travel": 1, "diaphragm_area": 0.0},
+        "identifier has no parameter 'windw': did you mean 'window'?; "
+        "travel: expected 'Type.DOUBLE' got 'Type.INTEGER': write 1.0; "
+        "diaphragm_area must be 1e-06 to 1000, got 0",
+    ),
     "gauge": ("identifier", {"pressure_reference": 0}, "'Type.INTEGER': write 0.0"),
     "number as a tag": ("identifier", {"valve_tag": 101}, "put it in quotes, '101'"),
     "no home": (

@@ -113,11 +113,6 @@ def _require_valid(values: Mapping[str, Any]) -> None:
     how = settings.identification
     require_valve_units(settings.valve, {**how.stated, **how.fixed})
     baseline_from(values["baseline_coulomb_friction"])
-    for one in CHANGEABLE:
-        if one.choices and one.spell(values[one.name]) not in one.choices:
-            raise ValueError(
-                f"{one.name} must be {' or '.join(one.choices)}, got {values[one.name]!r}"
-            )
 
 
 class _WholeValve:

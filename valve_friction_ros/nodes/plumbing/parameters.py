@@ -68,26 +68,25 @@ def declare_parameters(node: Node, settings: Iterable[Setting]) -> None:
     text, and ``null`` of a number that is unset. A number that ``ros2 param delete`` has unset
     stays declared.
 
-    Raises ValueError for an override with a name that no node of this package declares, if it was
-    given by ``-p`` or resembles a declared name. Other unknown overrides, as in a file shared with
-    other packages, are logged.
+    Raises ValueError for all overrides of wrong type, range or choice, and for those with a name
+    that no node of this package declares, if it was given by ``-p`` or resembles a declared name.
+    Other unknown overrides, as in a file shared with other packages, are logged.
     """
     declared = tuple(settings)
-    _require_known(node, {one.name for one in declared})
+    problems = [*_unknown(node, {one.name for one in declared})]
     unset = {one.name: one for one in declared if one.default is None}
     overrides = parameter_overrides(node)
     for name in [one for one in unset if one in overrides and overrides[one].value in UNSET]:
         del overrides[name]
-    if wrong := _wrong_type(declared, overrides.values()):
-        raise ValueError(wrong)
+    if problems := [*problems, *_problems(declared, overrides.values())]:
+        raise ValueError("; ".join(problems))
 
     def check(changes: list[Parameter]) -> SetParametersResult:
-        reason = _wrong_type(declared, changes)
+        reason = "; ".join(_problems(declared, changes))
         return SetParametersResult(successful=not reason, reason=reason)
 
-    node.add_on_set_parameters_callback(check)
-    for one in declared:
-        node.declare_parameter(one.name, one.default, _descriptor(one))
+    node.declare_parameters("", [(one.name, one.default, _descriptor(one)) for one in declared])
+    node.add_on_set_parameters_callback(check)  # now, as rclpy calls it for each declaration
     numbers = {
         one.name for one in declared if one.default is None or isinstance(one.default, float)
     }
@@ -106,18 +105,25 @@ def declare_parameters(node: Node, settings: Iterable[Setting]) -> None:
     node.add_post_set_parameters_callback(stay_declared)
 
 
-def _wrong_type(settings: Iterable[Setting], changes: Iterable[Parameter]) -> str:
-    """Return the problem with a parameter of wrong type, and the remedy, or ''.
+def _problems(settings: Iterable[Setting], changes: Iterable[Parameter]) -> Iterator[str]:
+    """Yield what is wrong with each parameter by itself, with the remedy.
 
-    rclpy checks no type where a parameter may be unset, and names no remedy.
+    rclpy tells only the first, checks no type where a parameter may be unset, and names no remedy.
     """
     known = {one.name: one for one in settings}
     for change in changes:
         if change.name not in known or change.type_ == Parameter.Type.NOT_SET:
             continue
-        default, value = known[change.name].default, change.value
+        one, value = known[change.name], change.value
+        default, (lowest, highest) = one.default, one.limits or (-math.inf, math.inf)
         wanted = Parameter("", value=math.nan if default is None else default).type_
-        if change.type_ == wanted or isinstance(default, list | tuple):
+        if isinstance(default, list | tuple):
+            continue
+        if change.type_ == wanted:
+            if one.choices and one.spell(value) not in one.choices:
+                yield f"there is no {one.name} {value!r}: choose from {', '.join(one.choices)}"
+            elif one.limits and not lowest <= value <= highest:
+                yield f"{one.name} must be {lowest:g} to {highest:g}, got {value:g}"
             continue
         is_whole = change.type_ == Parameter.Type.INTEGER
         remedy = {
@@ -127,12 +133,11 @@ def _wrong_type(settings: Iterable[Setting], changes: Iterable[Parameter]) -> st
         }.get(wanted, f"put it in quotes, '{value}'")
         # By name, because the types of Kilted format as numbers.
         types = f"expected 'Type.{wanted.name}' got 'Type.{change.type_.name}'"
-        return f"{change.name}: {types}: {remedy}"
-    return ""
+        yield f"{change.name}: {types}: {remedy}"
 
 
-def _require_known(node: Node, names: Collection[str]) -> None:
-    """Refuse or log overrides that no node reads."""
+def _unknown(node: Node, names: Collection[str]) -> Iterator[str]:
+    """Yield the problems of mistyped overrides; log other overrides that no node reads."""
     behind = (word for option, word in itertools.pairwise(sys.argv) if option in ("-p", "--param"))
     typed = {word.partition(":=")[0].rpartition(":")[2] for word in behind}  # for any node
     for name in parameter_overrides(node):
@@ -141,7 +146,8 @@ def _require_known(node: Node, names: Collection[str]) -> None:
         close = resembling(name, {*names, *NODE_NAMES})
         if close or name in typed:
             hint = nearest(name, close or sorted(names))
-            raise ValueError(f"{node.get_name()} has no parameter {name!r}: {hint}")
+            yield f"{node.get_name()} has no parameter {name!r}: {hint}"
+            continue
         node.get_logger().warning(
             f"no node of this package has the parameter {name!r}: it is ignored"
         )
@@ -188,7 +194,7 @@ def reject_invalid(
     def check(changes: list[Parameter]) -> SetParametersResult:
         if not any(parameter.name in names for parameter in changes):
             return SetParametersResult(successful=True)
-        reason = _wrong_type(watched, changes)
+        reason = "; ".join(_problems(watched, changes))
         if not reason:
             try:
                 build(values_of(node, watched, changes))
