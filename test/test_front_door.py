@@ -104,6 +104,10 @@ class TestReadRecording:
             ({"time_s": [0.0, 1.0, 0.5]}, "^time_s does not increase at sample 2: sort the rows$"),
             ({"pressure_pa": [1.0, NAN, 1.0]}, "^pressure_pa is not finite at sample 1$"),
             ({"pressure_pa": None}, "^there is no column 'pressure_pa' among time_s, position_m:"),
+            (
+                {"time_s": None, "pressure_pa": None},
+                "^there is no column 'time_s' and no column 'pressure_pa' among position_m: rename",
+            ),
         ],
     )
     def test_bad_columns_are_named(self, columns, message):

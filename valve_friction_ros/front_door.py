@@ -91,11 +91,22 @@ def read_recording(
 
 def _column(columns: Mapping[str, Any], name: str) -> NDArray[np.float64]:
     """Return a column as finite numbers; raises ValueError with its name if that fails."""
-    if name not in columns:
-        names = [str(one)[:40] for one in getattr(columns, "columns", columns)]
-        known = ", ".join(names[:_MOST_NAMES]) + " …" * (len(names) > _MOST_NAMES)
-        raise ValueError(f"there is no column {name!r} among {known or 'none'}: rename a column")
     return require_row(name, columns[name])
+
+
+def _require_names(columns: Mapping[str, Any], names: Sequence[str]) -> None:
+    """Refuse columns without some of the names; dates in the index stand in for the first."""
+    index = getattr(getattr(columns, "index", None), "dtype", None)
+    dated = names[:1] if getattr(index, "kind", "") in ("M", "m") else ()
+    lacking = [one for one in names if one not in columns and one not in dated]
+    if lacking:
+        there = [str(one)[:40] for one in getattr(columns, "columns", columns)]
+        known = ", ".join(there[:_MOST_NAMES]) + " …" * (len(there) > _MOST_NAMES)
+        raise ValueError(
+            f"there is no column {' and no column '.join(map(repr, lacking))} among "
+            f"{known or 'none'}: rename columns, in s, m, and Pa or N (force_n); write other units "
+            "to a file, whose headers may state them"
+        )
 
 
 _MOST_NAMES = 12
@@ -137,6 +148,7 @@ def _from_columns(columns: Mapping[str, Any]) -> Recording:
         )
     is_force = "force_n" in columns and "pressure_pa" not in columns
     names = ("force_n" if is_force else "pressure_pa", "position_m")
+    _require_names(columns, ("time_s", *names))
     stamps = _stamps(columns)
     drive, position = (_column(columns, name) for name in names)
     if not stamps.size == drive.size == position.size:

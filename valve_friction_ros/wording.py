@@ -511,7 +511,7 @@ def evidence_ratio_words(
 ) -> str:
     """Write how strongly a record favours one of two models, with the limits of this evidence."""
     digits = abs(log_ratio) / math.log(10.0)
-    ratio = f"1e{digits:.0f}" if digits >= 4 else f"{10.0**digits:.2g}"
+    ratio = f"1e{digits:.0f}" if digits >= 9 else without_exponent(f"{10.0**digits:.1g}")
     which = "first" if log_ratio > 0 else "second"
     told = "the record cannot distinguish between the two models"
     if support != "HARDLY":

@@ -178,7 +178,8 @@ class TestWithoutRos:
         parameters = {**yaml.safe_load(bench_yaml.read_text()), "valve_tag": "31-FV 7"}
         valve.write_text(yaml.safe_dump({"/**": {"ros__parameters": parameters}}))
         named = ("--valve", valve, "--table", table, "--form", form)
-        plan(*KNOWN, *QUICK, *named)
+        out = plan(*KNOWN, *QUICK, *named)
+        assert "s, too short for a person: lower --pressure-rate" in out
         rows = csv_rows(table)
         corners = [tuple(map(float, row.values())) for row in csv_rows(tmp_path / "test.csv")]
         ends = [float(row["time_s"]) + float(row["within_s"]) for row in rows]
@@ -197,6 +198,8 @@ class TestWithoutRos:
         assert column("setpoint_ma") == pytest.approx(4 + 16 * share, abs=6e-4)
         assert any("reversal" in row["tells"] for row in rows)
         text = form.read_text()
+        is_rest = [row["tells"].startswith("rest") for row in rows]
+        assert 0 < sum(is_rest) == len(rows) - text.count("[ ]   _______")  # of less than 2 s
         assert "ABORT" in text
         assert "valve 31-FV 7   date" in text
         assert "of the travel, measured from the end without air," in text

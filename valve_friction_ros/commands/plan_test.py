@@ -30,11 +30,13 @@ from valve_friction_ros.identification.settings import SLIDING, UNITS
 from valve_friction_ros.planning.conditions import Conditions, Limits
 from valve_friction_ros.planning.search import Forecast, StrokePlan, plan_remarks, plan_test
 from valve_friction_ros.planning.steps import (
+    BY_HAND,
     FINEST_POSITION,
     FINEST_PRESSURE,
     ShownUnit,
     form_of,
     set_points,
+    shortest_stroke,
     signal_range,
     stem_limits,
     table_of,
@@ -288,4 +290,9 @@ def run(options: argparse.Namespace) -> int:
         print(json.dumps(as_json(plan, options.output), ensure_ascii=False, allow_nan=False))
     else:
         print_plan(plan, options.output)
+        if options.form is not None and (shortest := shortest_stroke(steps)) < BY_HAND:
+            print(
+                f"note: {options.form} has strokes of {shortest:.1f} s, too short for a person: "
+                "lower --pressure-rate, and raise --duration"
+            )
     return ExitCode.DONE

@@ -37,7 +37,7 @@ from valve_friction_ros.model.checks import frozen, require_type, require_whole
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.simulation import simulate
 from valve_friction_ros.model.valve import KarnoppParameters, Valve
-from valve_friction_ros.wording import evidence_ratio_words
+from valve_friction_ros.wording import evidence_ratio_words, with_width
 
 
 class Support(Enum):
@@ -518,10 +518,11 @@ class Result:
         return rendering.text_of(self.to_dict(), self.findings)
 
     def __repr__(self) -> str:
-        """Return method, Coulomb friction and fit on one line."""
-        friction = self.parameters.get("coulomb_friction")
-        known = "" if friction is None else f", {friction.value:.6g} N ({friction.verdict.value})"
-        return f"<Result of method {self.method}{known}, fit {100 * self.fit:.2f} %>"
+        """Return method, friction and fit on one line."""
+        one = self.parameters.get(SLIDING) or self.parameters["coulomb_friction"]
+        name = one.name.replace("_", " ")
+        known = f"{name} {with_width(one.value, one.half_width)} N ({one.verdict.value})"
+        return f"<Result of method {self.method}, {known}, fit {100 * self.fit:.2f} %>"
 
     def __str__(self) -> str:
         """Return the table of the parameters."""

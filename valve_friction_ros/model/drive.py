@@ -41,6 +41,10 @@ class Drive(Enum):
     def __init__(self, words: str, unit: str, size: float) -> None:
         self.words, self.unit, self.size = words, unit, size
 
+    def __repr__(self) -> str:
+        """Return the name, without the values."""
+        return f"{type(self).__name__}.{self.name}"
+
     @property
     def label(self) -> str:
         """Name and unit, for an axis or a row."""

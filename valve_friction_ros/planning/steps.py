@@ -13,6 +13,7 @@ import csv
 import io
 import itertools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -28,6 +29,13 @@ _LEVEL = 1e-6
 """Change of pressure, share of the band, below which a step is a hold."""
 _QUICK = 0.9
 """Share of the largest rate from which a stroke is called quick. Chosen."""
+
+
+_REST = "rest: the next start shows whether static friction exceeds Coulomb friction"
+_SHORTEST_REST = 2.0
+"""Least rest, s, that has a line of its own in a form for a person. Chosen."""
+BY_HAND = 5.0
+"""Least duration, s, of a stroke that a person can make by hand. Chosen."""
 
 
 class ShownUnit(NamedTuple):
@@ -74,11 +82,21 @@ class SetPoint:
         """The set point on a loop of 4 to 20 mA."""
         return _LOW_CURRENT + _CURRENT_SPAN * self.share
 
+    @property
+    def is_short_rest(self) -> bool:
+        """Whether it is a rest that a person does not read off a stopwatch."""
+        return self.tells == _REST and self.duration < _SHORTEST_REST
+
+
+def shortest_stroke(steps: Sequence[SetPoint]) -> float:
+    """Return the duration of the shortest stroke, s."""
+    return min(one.duration for one in steps[1:] if one.tells != _REST)
+
 
 def _tells(before: float, now: float, after: float, largest: float) -> str:
     """Say what a step is for; the arguments are rates, Pa/s."""
     if now == 0:
-        return "rest: the next start shows whether static friction exceeds Coulomb friction"
+        return _REST
     words = ["reversal: Coulomb friction, dead band"] if before * now < 0 else []
     if abs(now) >= _QUICK * largest:
         words.append("fast: viscous friction, together with the slow strokes")
@@ -209,10 +227,11 @@ def form_of(
         f"{'at':>8} {'within':>8} {'to %':>7} {'mA':>7} {of_air:>8}  done  stem {of_stem:<2}  what "
         "it shows",
     ]
+    seen = [one for one in steps if not one.is_short_rest]
     lines += [
         f"{_clock(one.time):>8} {one.duration:>6.1f} s {100 * one.share:>7.1f} "
         f"{one.milliamperes:>7.2f} {pressure.shown(one.pressure, 2):>8}  [ ]   _______  {one.tells}"
-        for one in steps
+        for one in seen
     ]
     friction = likely.half_widths.get("coulomb_friction", math.nan)
     lines += [

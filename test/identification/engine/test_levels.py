@@ -160,7 +160,7 @@ class TestSlowRecord:
         found = result.parameters[SLIDING]
         assert found.verdict is Verdict.IDENTIFIED
         assert found.value == pytest.approx(FRICTION, rel=0.02)
-        assert any("sliding friction of 120 ± 7" in one for one in result.findings)
+        assert any("friction near rest of 120 ± 7" in one for one in result.findings)
 
     @pytest.mark.parametrize("late", [-2.0, 2.0, 4.0])
     def test_late_stem(self, late):
@@ -187,6 +187,7 @@ class TestSlowRecord:
         found = identify(recording(staircase(period=4.0, ramp=1.0)), VALVE)
         assert found.parameters[SLIDING].verdict is Verdict.WEAK
         assert found.parameters[SLIDING].value == pytest.approx(FRICTION, rel=0.05)
+        assert found.parameters[SLIDING].reason.startswith("it is the friction near rest")
         assert any("too slow for the motion" in one for one in found.warnings)
         with pytest.raises(RefusalError, match="too slow for the motion"):
             identify(recording(staircase(period=4.0, ramp=1.0, rest=11.0)), VALVE)

@@ -401,7 +401,7 @@ def _as_sampled(
         return outcome._replace(parameters=doubted)
     level, reason = levels.numbers[SLIDING], verdicts.BY_LEVELS
     shown = (
-        "the levels at which force and stem rest show a sliding friction of "
+        "the levels at which force and stem rest show a friction near rest of "
         f"{three_digits(level.value)} ± {two_digits(level.half_width)} N"
     )
     if known is not None and known is not level and known.value > 0:

@@ -432,7 +432,10 @@ def _no_surer_than_its_spring(verdicts: dict[str, Parameter]) -> dict[str, Param
     return {**verdicts, "spring_preload": weak}
 
 
-BY_LEVELS = "it follows from the levels at which force and stem rest, and no move confirms it"
+BY_LEVELS = (
+    "it is the friction near rest, from the levels at which force and stem rest: no move confirms "
+    "it, and viscous friction of faster moves comes on top"
+)
 
 
 def unlike_levels(value: float) -> str:
