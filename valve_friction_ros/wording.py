@@ -532,7 +532,7 @@ def evidence_ratio_words(
 
 
 _LACKS = {
-    "RESULT": "its identifier has not produced a result since it started",
+    "RESULT": "nothing has been identified since the identifier started",
     "VALUE": "{of} is not identifiable",
     "SIZE": "{of} is not positive",
     "INTERVAL": "{of} has no interval",

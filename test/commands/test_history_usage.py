@@ -51,7 +51,7 @@ def test_below_the_list(listed, monkeypatch):
     lines = listed().splitlines()
     new = figures.format("1.5", 10, 4, 21)
     assert f"usage: {new}, since 2026-09-23 (packing renewed)" in lines
-    assert f"usage: {figures.format('4.5', 30, 12, 63)}, in all" in lines
+    assert f"usage: {figures.format('4.5', 30, 12, 63)}, in total" in lines
     assert "alarm recordings: 2, the latest 2026-09-21T14:13:20Z ERROR: /alarms/1" in lines
 
 
@@ -79,7 +79,7 @@ def test_days(listed, monkeypatch):
     output = listed("--usage", "--valve", "FV-101", "--until", "2026-09-22")
     total = "3 m of travel, 20 reversals, 8 breakaways in 42 h monitored, from 2026-09-21 to"
     assert total in output
-    assert "in all" not in output
+    assert "in total" not in output
 
 
 def test_days_in_json_and_csv(listed, tmp_path):

@@ -21,7 +21,7 @@ from histories import DAY, OTHER, SECOND, START, VALVE, refused, success
 
 from valve_friction_ros.dashboard.charts import trend_chart
 from valve_friction_ros.dashboard.history_cache import HistoryCache, KeptValves
-from valve_friction_ros.dashboard.live_state import Plant, Quantity, ValveView
+from valve_friction_ros.dashboard.live_state import Plant, Quantity, Status, Unread, ValveView
 from valve_friction_ros.dashboard.plant_rows import compared, side_of_entry, side_of_view
 from valve_friction_ros.health import (
     AlarmAction,
@@ -88,6 +88,27 @@ def test_it_is_read_again_when_it_has_changed(file, kept):
     assert len(kept.valve(VALVE.name).entries) == 32
     assert kept.spark(OTHER.name) is None  # without a baseline there is no ratio
     assert {one.name for one in kept.valves} == {VALVE.name, OTHER.name}
+
+
+def test_a_valve_that_is_not_heard_shows_its_last_state_in_the_history(file, kept):
+    """The refused record after it changes nothing; the first message replaces it."""
+    plant = Plant(5.0)
+    plant.expect(kept.last.values())
+    (valve,) = plant.valves(0.0)
+    assert (valve.view.tag, valve.view.identified) == (VALVE.tag, START + 29 * DAY)
+    assert (valve.view.friction.value, valve.view.friction.half_width) == (179.0, 3.0)
+    assert valve.view.sentence == kept.valve(VALVE.name).entries[29].diagnosis.message
+    assert plant.valve(VALVE.name, 0.0).view == valve.view
+    file.add(success(START + 32 * DAY, 300.0, baseline=BASELINE))
+    assert kept.refresh()
+    plant.expect(kept.last.values())
+    (newer,) = plant.valves(0.0)
+    assert newer.view.friction.value == 300.0
+    assert newer.revision > valve.revision
+    heard = Status(f"{VALVE.name}: friction", 0, "FV-101", "now", {})
+    plant.hear(Unread(heard.name, lambda: heard), 1.0)
+    plant.expect(kept.last.values())
+    assert plant.valves(1.0)[0].view.sentence == "now"
 
 
 def test_a_server_is_asked_and_not_waited_for(file, database, postgres, monkeypatch):

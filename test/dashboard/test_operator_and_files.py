@@ -206,6 +206,12 @@ def test_the_files_of_a_valve(files):
     assert files.offered("/fv_102") == []
 
 
+def test_a_report_is_found_by_the_path_that_its_identifier_names(files):
+    assert files.report(f"/elsewhere/reports/{NAMED}.html") == f"/files/reports/{NAMED}.html"
+    assert files.report(f"/elsewhere/{NAMED}_2.html") is None
+    assert files.report("../secret") is None
+
+
 def test_valves_whose_files_have_the_same_names_are_named():
     others = ["/a/b", "/a_b", "/a_b/", "/a/c", "/", "/a_b"]
     assert ValveFiles.sharing("/a/b", others) == ("/a_b", "/a_b/")

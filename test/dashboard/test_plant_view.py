@@ -22,7 +22,7 @@ from simulated_plant import hear, values_of_valve
 
 from valve_friction_ros.dashboard import Plant, Selection, Status, Unread, selected
 from valve_friction_ros.dashboard.history_cache import sparkline
-from valve_friction_ros.dashboard.live_state import MOST_VALVES
+from valve_friction_ros.dashboard.live_state import MOST_VALVES, ValveView
 from valve_friction_ros.dashboard.plant_rows import (
     SORTS,
     STATES,
@@ -71,7 +71,9 @@ def nodes_of(plant, now):
 
 def test_what_the_history_knows_is_missed():
     plant = Plant(5.0)
-    plant.expect([("/area_1/fv_101/identifier", "FV-101"), ("/x/identifier", "X")])
+    plant.expect(
+        [ValveView("/area_1/fv_101/identifier", "FV-101"), ValveView("/x/identifier", "X")]
+    )
     hear(plant, Status(*values_of_valve(0)), 100.0)
     first, second = plant.valves(101.0)
     assert (first.silent_for, first.is_silent) == (1.0, False)
@@ -89,7 +91,7 @@ def test_names_from_outside_do_not_fill_the_memory():
 
 def test_a_name_that_nothing_keeps_is_forgotten():
     plant = Plant(5.0)
-    plant.expect([("/kept/identifier", "KEPT")])
+    plant.expect([ValveView("/kept/identifier", "KEPT")])
     hear_named(plant, "kept", "passing", "late", at=0.0)
     hear_named(plant, "late", at=100.0)
     assert len(plant.valves(3599.0)) == 3
@@ -319,7 +321,7 @@ def test_all_good_is_said_of_good_valves_only():
 
 
 def test_what_only_the_history_knows_comes_last(plant):
-    plant.expect([("/x/identifier", "X")])
+    plant.expect([ValveView("/x/identifier", "X")])
     assert tags(plant)[-1] == "X"
     assert tags(plant, Selection(states=frozenset({"unheard"}))) == ["X"]
     hear_named(plant, "x", at=NOW)

@@ -132,7 +132,7 @@ def test_nobody_answers_an_alarm_before_it_was_raised():
         (AlarmAction.ACKNOWLEDGE, "  ", "", 0, "who is empty"),
         (AlarmAction.ACKNOWLEDGE, "x" * 81, "", 0, "at most 80"),
         (AlarmAction.ACKNOWLEDGE, "a\nb", "", 0, "one line"),
-        (AlarmAction.COMMENT, "A", " ", 0, "text is empty"),
+        (AlarmAction.COMMENT, "A", " ", 0, "comment is empty"),
         (AlarmAction.COMMENT, "A", "x" * 501, 0, "at most 500"),
         (AlarmAction.SHELVE, "A", "", math.inf, "for inf h"),
         (AlarmAction.SHELVE, "A", "", math.nan, "for nan h"),
@@ -212,8 +212,11 @@ def test_an_alarm_that_contradicts_itself_cannot_be(state, condition, until):
 
 
 def test_a_summary_names_what_is_not_normal():
-    assert not alarm_summary([Alarm(HIGH)])
-    assert alarm_summary([after(WARN), Alarm(AlarmKind.STUCK)]) == "friction high: unacknowledged"
+    every = [Alarm(kind) for kind in AlarmKind]
+    assert alarm_summary(every) == "all alarms of the valve are normal"
+    assert alarm_summary([after(WARN), *every[2:4]]) == (
+        "friction high: unacknowledged; stuck, whole valve: normal"
+    )
     shelved = alarm_summary([after(WARN, AlarmAction.SHELVE)])
     assert shelved == "friction high: shelved until 2027-01-15 16:00 UTC"
 

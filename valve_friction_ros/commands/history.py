@@ -93,10 +93,10 @@ def service_lines(
     """Return the lines below the list of a valve: usage, responses and latest alarm."""
     lines = []
     if usage.days:
-        since = f"since {utc_day(usage.renewal)} (packing renewed)" if usage.renewal else "in all"
+        since = f"since {utc_day(usage.renewal)} (packing renewed)" if usage.renewal else "in total"
         lines.append(f"usage: {_words(usage.since_renewal)}, {since}")
         if usage.renewal:
-            lines.append(f"usage: {_words(usage.total)}, in all")
+            lines.append(f"usage: {_words(usage.total)}, in total")
     if response is not None and response.moves:
         lines.append(f"stem_command: {_answers(response)}")
     if alarms:

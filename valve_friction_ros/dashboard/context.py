@@ -20,13 +20,20 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple, Protocol
+from urllib.parse import quote
 from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 
 from valve_friction_ros.dashboard.accounts import Access
 from valve_friction_ros.dashboard.history_cache import HistoryCache
 from valve_friction_ros.dashboard.live_state import Plant
 from valve_friction_ros.dashboard.live_strip import LiveStrip
-from valve_friction_ros.health.alarms import AlarmAction, AlarmError, AlarmKind, AlarmRequest
+from valve_friction_ros.health.alarms import (
+    AlarmAction,
+    AlarmError,
+    AlarmKind,
+    AlarmRequest,
+    alarm_summary,
+)
 from valve_friction_ros.history import HistoryError, KeptValve, Place, request_alarms, request_many
 from valve_friction_ros.outside_text import printable
 from valve_friction_ros.wording import numbered
@@ -222,7 +229,7 @@ class DashboardContext:
             steps = await asyncio.to_thread(request_alarms, file, kept, kind, request, now)
         except (AlarmError, HistoryError) as error:
             return Answer(False, str(error))
-        return Answer(True, "; ".join(str(one.alarm) for one in steps.events))
+        return Answer(True, alarm_summary(one.alarm for one in steps.events))
 
     async def answer_alarms(
         self, alarms: Sequence[tuple[KeptValve, AlarmKind]], request: AlarmRequest
@@ -275,6 +282,11 @@ class OfferedFile(NamedTuple):
     size: int
     time: float
 
+    @property
+    def address(self) -> str:
+        """Path and query of its address."""
+        return f"/files/{quote(self.kind)}/{quote(self.path)}"
+
 
 def _stem(namespace: str) -> str:
     return namespace.strip("/").replace("/", "_")
@@ -308,6 +320,14 @@ class ValveFiles:
             return None
         is_inside = wanted.is_relative_to(root) and wanted.suffix.lower() in _ENDINGS
         return wanted if is_inside and wanted.is_file() else None
+
+    def report(self, path: str) -> str | None:
+        """Return the address of a report by its path on the machine that wrote it, if it is here.
+
+        Return None if this dashboard does not serve it.
+        """
+        name = Path(path).name
+        return f"/files/reports/{quote(name)}" if self.found("reports", name) else None
 
     def offered(self, namespace: str) -> list[OfferedFile]:
         """Return the reports and bags of a valve by its namespace, the newest first."""

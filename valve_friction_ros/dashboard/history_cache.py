@@ -24,7 +24,7 @@ from statistics import fmean, median
 from typing import TYPE_CHECKING, NamedTuple
 
 from valve_friction_ros import history as database
-from valve_friction_ros.dashboard.live_state import Plant, Status, Unread
+from valve_friction_ros.dashboard.live_state import Plant, Quantity, Status, Unread, ValveView
 from valve_friction_ros.health.alarms import Alarm, AlarmError, AlarmKind, AlarmState
 from valve_friction_ros.health.levels import Level, StatusSignal, Survey
 from valve_friction_ros.history import (
@@ -45,10 +45,11 @@ from valve_friction_ros.history.status_values import (
     trend_values,
 )
 from valve_friction_ros.model.valve import Valve
+from valve_friction_ros.outside_text import printable
 from valve_friction_ros.streams import DAY, END_OF_TIME
 
 if TYPE_CHECKING:
-    from valve_friction_ros.history import HistoryMark
+    from valve_friction_ros.history import HistoryMark, LastState
 
 
 _SPARK_POINTS = 40
@@ -104,6 +105,22 @@ _SERVER_PAUSE = 2.0
 """Minimum time between two queries to a server, s."""
 
 
+def _view_of_last(state: "LastState") -> ValveView:
+    return ValveView(
+        state.valve.name,
+        printable(state.valve.tag, 80),
+        state.level,
+        state.status_signal,
+        printable(state.message, 2000),
+        identified=state.time,
+        ratio=state.ratio,
+        parameters=tuple(
+            Quantity(one.name, one.value, one.half_width, "N", one.verdict.value, one.reason)
+            for one in state.frictions
+        ),
+    )
+
+
 class HistoryCache:
     """Cached contents of the history, for all valves and per valve.
 
@@ -142,6 +159,8 @@ class HistoryCache:
         self._ends: dict[KeptValve, int] = {}
         """Earliest end of shelving or time out of service of each valve, ns."""
         self.valves: tuple[KeptValve, ...] = ()
+        self.last: dict[str, ValveView] = {}
+        """The last known state of each valve, by the name of its identifier."""
         self.problem: str | None = None if place else "no history_file is named: nothing is kept"
         self.revision = 0
         self.alarm_revision = 0
@@ -178,8 +197,9 @@ class HistoryCache:
                 if mark == self._mark and mark.settled and self.problem is None:
                     return False
                 valves = self.file.valves()
+                last = database.last_states(self.file)
                 found = database.ratios_after(self.file, self._row, since)
-            except HistoryError as error:
+            except (HistoryError, ValueError) as error:
                 is_new, self.problem = str(error) != self.problem, str(error)
                 self.revision += is_new
                 return is_new
@@ -194,6 +214,8 @@ class HistoryCache:
             for valve in {one.valve for one in found}:
                 self._sparks[valve] = sparkline(*zip(*self._ratios[valve], strict=True))
             self._histories.clear()
+            self.last = {valve.name: ValveView(valve.name, valve.tag) for valve in valves}
+            self.last |= {one.valve.name: _view_of_last(one) for one in last}
             self.valves = valves  # last: other threads must find the rest complete
             self.revision += 1
             return True
@@ -341,7 +363,7 @@ class KeptValves(HistoryCache):
     def _tell(self) -> None:
         """Pass on the statuses of all valves; an alarm event alone rereads no histories."""
         now = time.monotonic()
-        self._plant.expect(self.valves)
+        self._plant.expect(self.last.values())
         mark = None if self._mark is None else self._mark._replace(alarm_event=0)
         if mark != self._read or mark is None or not mark.settled:
             self._statuses.clear()

@@ -104,8 +104,11 @@ def _entry(key: str, text: str) -> Entry:
     else:
         is_whole = abs(value) < 1e9 and value == round(value)
         shown = f"{value:.0f}" if is_whole else without_exponent(f"{value:.4g}")
+    if unit == "time":
+        shown = shown.replace("T", " ").replace("Z", " UTC")
     unit = "" if unit in ("date", "time", "1") else unit
-    return Entry(printable(name_in_words(name), _LONGEST_TEXT), shown, printable(unit, 40))
+    title = name_in_words(name).replace(" in all", ", total")
+    return Entry(printable(title, _LONGEST_TEXT), shown, printable(unit, 40))
 
 
 _CHANGE = " change"
@@ -456,6 +459,11 @@ class _Valve:
         self._whole = view
         self._read: Unread | None = None
 
+    def last_was(self, view: ValveView) -> None:
+        """Show a state that was known before the first status."""
+        self.view = self._whole = view
+        self.revision += 1
+
     def look(self, node: str) -> None:
         """Read what a table shows from the latest status; an invalid status changes nothing.
 
@@ -511,18 +519,17 @@ class Plant:
             return
         with self._lock:
             self._tidy(at)
-            if (valve := self._entry(node, "")) is not None:
+            if (valve := self._entry(node)) is not None:
                 valve.at, valve.latest = at, status
 
-    def expect(self, valves: Iterable[tuple[str, str]]) -> None:
-        """Show the valves of the history, as (identifier, tag), even before they are heard.
-
-        They are never dropped.
-        """
+    def expect(self, valves: Iterable[ValveView]) -> None:
+        """Show the last known states of valves until they are heard; never drop these valves."""
         with self._lock:
-            for node, tag in valves:
-                if (valve := self._entry(node, tag)) is not None:
+            for view in valves:
+                if (valve := self._entry(view.node)) is not None:
                     valve.is_kept = True
+                    if valve.latest is None and valve.view != view:
+                        valve.last_was(view)
 
     def _tidy(self, now: float) -> None:
         """Drop valves that the history does not hold and that have long been silent."""
@@ -537,11 +544,11 @@ class Plant:
         for node in gone:
             del self._valves[node]
 
-    def _entry(self, node: str, tag: str) -> _Valve | None:
+    def _entry(self, node: str) -> _Valve | None:
         """Return a valve, adding it if there is room."""
         valve = self._valves.get(node)
         if valve is None and len(self._valves) < MOST_VALVES:
-            view = view_of(node, Status("", 3, tag, "", {}))
+            view = view_of(node, Status("", 3, "", "", {}))
             valve = self._valves[node] = _Valve(next(self._numbers), view)
         return valve
 

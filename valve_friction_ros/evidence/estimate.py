@@ -407,7 +407,7 @@ def _too_few(moves: Moves, has_changed: bool) -> str:
     some = f"{numbered(blocks, 'block')} of time"
     since = " since friction changed" if has_changed else ""
     return (
-        f"{up} moves up and {down} down in {some}{since}: {FEWEST_MOVES} of each "
+        f"{numbered(up, 'move')} up and {down} down in {some}{since}: {FEWEST_MOVES} of each "
         f"in {FEWEST_BLOCKS} blocks are needed; leave the valve in service"
     )
 

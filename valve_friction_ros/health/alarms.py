@@ -18,7 +18,8 @@ import json
 import math
 import threading
 import uuid
-from collections.abc import Hashable, Iterable, Mapping
+from collections import defaultdict
+from collections.abc import Callable, Hashable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from datetime import datetime, timezone
 from enum import Enum
@@ -228,10 +229,15 @@ class Alarm:
         """What to do about it, as a sentence."""
         return alarm_advice(self.kind.value, self.condition.level.name)
 
-    def __str__(self) -> str:
-        """Return kind, state and end of a suppression on one line."""
+    @property
+    def standing(self) -> str:
+        """Its state, and the end of a suppression."""
         end = "" if self.until is None else f" until {utc_minute(self.until)}"
-        return f"{self.kind.words}: {self.state.value}{end}"
+        return f"{self.state.value}{end}"
+
+    def __str__(self) -> str:
+        """Return its kind and standing on one line."""
+        return f"{self.kind.words}: {self.standing}"
 
 
 _SHOWN = (AlarmState.UNACKNOWLEDGED, AlarmState.ACKNOWLEDGED)
@@ -301,7 +307,7 @@ class AlarmRequest:
         if not self.who:
             raise AlarmError("who is empty: state your name")
         if self.action is AlarmAction.COMMENT and not self.text:
-            raise AlarmError("text is empty: write the comment")
+            raise AlarmError("the comment is empty: write one")
         if (longest_time := _LONGEST.get(self.action)) is None:
             return
         if not 0 < self.duration * 1e9 <= longest_time:
@@ -408,14 +414,24 @@ def all_requested(
         and (is_of_all or one.state is not AlarmState.NORMAL)
     ]
     if not possible:
-        standing = alarm_summary(alarms.values()) or "all alarms of the valve are normal"
+        standing = alarm_summary(alarms.get(one, Alarm(one)) for one in AlarmKind)
         raise AlarmError(f"no alarm can be {request.action.value} now: {standing}")
     return tuple(requested(one, request, time) for one in possible)
 
 
-def alarm_summary(alarms: Iterable[Alarm]) -> str:
-    """Return one line with the alarms that are not normal; empty if all are normal."""
-    return "; ".join(str(one) for one in alarms if one.state is not AlarmState.NORMAL)
+def alarm_summary(
+    alarms: Iterable[Alarm], standing: Callable[[Alarm], str] = lambda one: one.standing
+) -> str:
+    """Return one line with the alarms of a valve, those in the same state together."""
+    kinds: defaultdict[str, list[str]] = defaultdict(list)
+    for one in alarms:
+        kinds[standing(one)].append(one.kind.words)
+    return "; ".join(
+        f"all alarms of the valve are {state}"
+        if len(some) == len(AlarmKind)
+        else f"{', '.join(some)}: {state}"
+        for state, some in kinds.items()
+    )
 
 
 _DAY = 86_400.0

@@ -42,7 +42,9 @@ if TYPE_CHECKING:
         HistoryFile as HistoryFile,
         HistoryMark as HistoryMark,
         KeptRatio as KeptRatio,
+        LastState as LastState,
         history_mark as history_mark,
+        last_states as last_states,
         ratios_after as ratios_after,
     )
     from valve_friction_ros.history.outbox import (

@@ -9,6 +9,7 @@
 
 """History of the valves of a plant: a file shared by several processes, or a server."""
 
+from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -18,6 +19,8 @@ import sqlalchemy as sa
 from sqlalchemy.engine import Connection
 
 from valve_friction_ros.health.baseline import Baseline
+from valve_friction_ros.health.comparison import Ratio
+from valve_friction_ros.health.levels import Level, StatusSignal
 from valve_friction_ros.health.measured import DatedNumber
 from valve_friction_ros.health.valve_diagnosis import KnownNumbers
 from valve_friction_ros.history import tables
@@ -33,11 +36,14 @@ from valve_friction_ros.history.rows import (
     numbers_in,
     oldest_kept,
     points_in,
+    ratio_in,
     record_in,
+    value_of,
     valve_id,
 )
 from valve_friction_ros.history.tables import joined, of_valve
 from valve_friction_ros.identification.settings import FORMER_METHODS, SLIDING
+from valve_friction_ros.identification.trust.verdict import Parameter
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.streams import END_OF_TIME
 
@@ -227,6 +233,72 @@ class KeptRatio(NamedTuple):
     valve: str
     time: int
     ratio: float
+
+
+class LastState(NamedTuple):
+    """Last successful identification of a valve, as a list of valves shows it.
+
+    Attributes
+    ----------
+    valve : KeptValve
+        The valve.
+    time : int
+        Time of the identification, ns since 1970 (UTC).
+    level, status_signal : Level, StatusSignal
+        Level and NE 107 status signal of its diagnosis.
+    message : str
+        Message of its diagnosis.
+    ratio : Ratio or None
+        Friction over baseline.
+    frictions : tuple of Parameter
+        Its Coulomb and sliding friction.
+    """
+
+    valve: KeptValve
+    time: int
+    level: Level
+    status_signal: StatusSignal
+    message: str
+    ratio: Ratio | None
+    frictions: tuple[Parameter, ...]
+
+
+def last_states(file: History) -> tuple[LastState, ...]:
+    """Return the last successful identification of each valve.
+
+    Raises HistoryError if the history cannot be read.
+    """
+    table, parameter = tables.identification, tables.parameter
+    newest = (
+        sa.select(sa.func.max(table.c.id))
+        .where(table.c.refusal.is_(None))
+        .group_by(table.c.valve_id)
+    )
+    query = (
+        sa.select(table, tables.valve.c.name.label("valve_name"), tables.valve.c.tag)
+        .select_from(joined(table, tables.valve))
+        .where(table.c.id.in_(newest))
+    )
+    of_entries = sa.select(parameter).where(
+        parameter.c.identification_id.in_(newest),
+        parameter.c.name.in_(("coulomb_friction", SLIDING)),
+    )
+    frictions: defaultdict[int, list[Parameter]] = defaultdict(list)
+    with reading(file.place) as connection:
+        for row in connection.execute(of_entries).mappings():
+            frictions[row["identification_id"]].append(value_of(Parameter, row))
+        return tuple(
+            LastState(
+                KeptValve(row["valve_name"], row["tag"]),
+                row["time_ns"],
+                Level(row["level"]),
+                StatusSignal(row["status_signal"]),
+                row["message"],
+                ratio_in(row),
+                tuple(frictions[row["id"]]),
+            )
+            for row in connection.execute(query).mappings()
+        )
 
 
 class HistoryMark(NamedTuple):

@@ -366,14 +366,19 @@ def _parameter(row: RowMapping) -> Parameter:
     return replace(shown, uncalibrated=replace(shown, standard_error=math.nan, half_width=width))
 
 
+def ratio_in(row: RowMapping) -> Ratio | None:
+    """Return the ratio in the row of an identification."""
+    if row["ratio"] is None:
+        return None
+    low, high = (_number(row[f"ratio_{end}"]) for end in ("low", "high"))
+    of, speed = row["ratio_of"] or "coulomb_friction", _number(row["ratio_speed"])
+    return Ratio.between(row["ratio"], low, high, of=of, speed=speed)
+
+
 def _entry(
     row: RowMapping, parameters: Sequence[Parameter], numbers: Mapping[str, Measured]
 ) -> HistoryEntry:
-    ratio = None
-    if row["ratio"] is not None:
-        low, high = (_number(row[f"ratio_{end}"]) for end in ("low", "high"))
-        of, speed = row["ratio_of"] or "coulomb_friction", _number(row["ratio_speed"])
-        ratio = Ratio.between(row["ratio"], low, high, of=of, speed=speed)
+    ratio = ratio_in(row)
     limits = value_of(FrictionLimits, row)
     return HistoryEntry(
         time=row["time_ns"],

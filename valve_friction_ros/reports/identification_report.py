@@ -275,7 +275,7 @@ def usage_section(
     if usage.renewal:
         date = utc(usage.renewal)
         since = f"since the packing was renewed, {date:%Y-%m-%d}"
-    columns = (Column("usage"), Column(since, is_number=True), Column("in all", is_number=True))
+    columns = (Column("usage"), Column(since, is_number=True), Column("total", is_number=True))
     old, new = _usage_cells(used, valve), _usage_cells(everything, valve)
     table = PageTable(columns, tuple((name, old[name], new[name]) for name in old))
     life = () if limits is None else _life(limits)

@@ -10,7 +10,8 @@
 """The page *Alarms*: lists, filters, answers and exports current alarms and all events."""
 
 import time
-from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Awaitable, Callable, Hashable, Iterable, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from functools import partial
@@ -42,11 +43,12 @@ from valve_friction_ros.health.alarms import (
     AlarmKind,
     AlarmRequest,
     AlarmState,
+    alarm_summary,
 )
 from valve_friction_ros.history import AlarmFilter, HistoryError, KeptAlarmEvent
 from valve_friction_ros.outside_text import printable
 from valve_friction_ros.streams import DAY
-from valve_friction_ros.wording import numbered
+from valve_friction_ros.wording import capitalised, numbered
 
 _PERIOD = 1.0
 
@@ -65,13 +67,13 @@ _LONGEST_SEARCH = 200
 
 _ACTIONS = {
     AlarmAction.ACKNOWLEDGE: "Acknowledge",
-    AlarmAction.SHELVE: "Shelve",
     AlarmAction.UNSHELVE: "Unshelve",
-    AlarmAction.TAKE_OUT: "Take out of service",
     AlarmAction.PUT_BACK: "Put back into service",
+    AlarmAction.SHELVE: "Shelve",
+    AlarmAction.TAKE_OUT: "Take out of service",
     AlarmAction.COMMENT: "Comment",
 }
-"""Actions of a person, with the labels of their buttons."""
+"""Actions of a person, with the labels of their buttons; a form begins with the first possible."""
 
 _LASTING = frozenset({AlarmAction.SHELVE, AlarmAction.TAKE_OUT})
 """Actions that last for a set time."""
@@ -80,6 +82,11 @@ _LASTING = frozenset({AlarmAction.SHELVE, AlarmAction.TAKE_OUT})
 def _possible(alarm: Alarm) -> tuple[AlarmAction, ...]:
     """Return the actions that an alarm allows now."""
     return tuple(one for one in _ACTIONS if (alarm.state, one) in TRANSITIONS)
+
+
+def _is_quiet(alarm: Alarm) -> bool:
+    """Return whether an alarm only follows its valve: out of service and inactive."""
+    return alarm.state is AlarmState.OUT_OF_SERVICE and not alarm.is_active
 
 
 def _state(alarm: Alarm, zone: ZoneInfo) -> str:
@@ -149,18 +156,29 @@ def _urgency(one: KeptAlarmEvent) -> tuple[bool, bool]:
     return state.is_suppressed, not state.needs_answer
 
 
-def _row(number: int, one: KeptAlarmEvent, zone: ZoneInfo, href: str, is_journal: bool) -> Any:
-    """Return a row under fixed keys, with `number` as its identity."""
+def _merged(events: Sequence[KeptAlarmEvent]) -> list[tuple[KeptAlarmEvent, int]]:
+    """Return the events, with a single one for the quiet alarms of a valve, and their number."""
+    groups: defaultdict[Hashable, list[KeptAlarmEvent]] = defaultdict(list)
+    for k, one in enumerate(events):
+        alarm = one.event.alarm
+        groups[(one.valve, alarm.until) if _is_quiet(alarm) else k].append(one)
+    return [(some[0], len(some)) for some in groups.values()]
+
+
+def _row(
+    number: int, one: KeptAlarmEvent, alarms: int, zone: ZoneInfo, href: str, is_journal: bool
+) -> Any:
+    """Return a row for some alarms of a valve under fixed keys, with `number` as its identity."""
     event, alarm = one.event, one.event.alarm
     level = alarm.condition.level
     by = f"{event.action.value} by {event.who}" if event.who else event.action.value
     return {
         "i": number,
-        "alarm": [one.valve.name, alarm.kind.value],
+        "alarm": [one.valve.name, alarm.kind.value if alarms == 1 else ""],
         "href": href,
         "tag": printable(one.valve.tag, 80),
         "area": printable(one.area, 120),
-        "kind": alarm.kind.words,
+        "kind": alarm.kind.words if alarms == 1 else numbered(alarms, "alarm"),
         "state": alarm.state.value,
         "until": "" if alarm.until is None else minute(alarm.until, zone),
         "css": level.name.lower() if alarm.is_told else "unknown",
@@ -325,10 +343,12 @@ class _AlarmPage:
             problem = str(error)
         self._shown, self._events = state, events[:_MOST_ROWS]
         address = self._page.link
+        shown = [(e, 1) for e in self._events] if one.is_journal else _merged(self._events)
         rows = [
-            _row(k, each, self._page.zone, address("/valve", node=each.valve.name), one.is_journal)
-            for k, each in enumerate(self._events)
-        ]
+            _row(k, each, alarms, self._page.zone, address("/valve", node=each.valve.name),
+                 one.is_journal)
+            for k, (each, alarms) in enumerate(shown)
+        ]  # fmt: skip
         empty = "No alarm matches the filters." if one.to_query() else "No current alarms."
         self._table.send({"rows": rows, "journal": one.is_journal, "empty": empty})
         waiting = sum(each.event.alarm.state.needs_answer for each in self._events)
@@ -347,18 +367,24 @@ class _AlarmPage:
             return
         # By its name: the rows in the browser may be older than ours.
         asked, name = given
-        some = (e for e in self._events if [e.valve.name, e.event.alarm.kind.value] == asked)
+        node, kind = asked
+        of_valve = [e for e in self._events if e.valve.name == node]
+        some = (
+            e
+            for e in of_valve
+            if (e.event.alarm.kind.value == kind if kind else _is_quiet(e.event.alarm))
+        )
         if (one := next(some, None)) is None:
             return
         alarm = one.event.alarm
-        state = _state(alarm, self._page.zone)
-        title = f"{printable(one.valve.tag, 80)}, {alarm.kind.words}: {state}"
+        state, words = _state(alarm, self._page.zone), alarm.kind.words if kind else "all alarms"
+        title = f"{printable(one.valve.tag, 80)}, {words}: {state}"
         may, who = _possible(alarm), self._context.visitors.name()
         chosen = next((action for action in may if action.name == name), None)
         if name and chosen is None:
-            self._answer.tell(False, f"{title} already")
+            self._answer.tell(False, f"The alarm has changed: {title}")
             return
-        answer = partial(self._context.answer_alarm, one.valve.name, alarm.kind)
+        answer = partial(self._context.answer_alarm, node, alarm.kind if kind else None)
         await self._answer.ask(title, may, who, answer, chosen)
         self._shown = ()
 
@@ -402,8 +428,11 @@ class AlarmStates:
     def _draw_alarms(self, alarms: Sequence[Alarm]) -> None:
         if not alarms:
             text("p", "No current alarms.", "vf-none")
+        if quiet := [one for one in alarms if _is_quiet(one)]:
+            text("p", capitalised(alarm_summary(quiet, partial(_state, zone=self._zone))) + ".")
         for one in alarms:
-            self._draw_alarm(one)
+            if one not in quiet:
+                self._draw_alarm(one)
 
     def _draw_alarm(self, one: Alarm) -> None:
         css = one.condition.level.name.lower() if one.is_told else "unknown"

@@ -129,7 +129,7 @@ class _PlantPage:
         self._drawn = time.monotonic()
 
     def _heard(self) -> list[Heard]:
-        self._context.plant.expect(self._context.history.valves)
+        self._context.plant.expect(self._context.history.last.values())
         return self._context.plant.valves(time.monotonic())
 
     async def _tick(self) -> None:
@@ -235,7 +235,7 @@ class _ComparePage:
 
     async def draw(self, page: Frame) -> None:
         self._page = page
-        self._context.plant.expect(self._context.history.valves)
+        self._context.plant.expect(self._context.history.last.values())
         valves = sorted(
             (one.view.tag, one.view.node) for one in self._context.plant.valves(time.monotonic())
         )

@@ -14,7 +14,6 @@ import time
 from collections.abc import Callable, Sequence
 from datetime import datetime, timezone
 from typing import Any
-from urllib.parse import quote
 from zoneinfo import ZoneInfo
 
 from nicegui import ui
@@ -144,13 +143,19 @@ def draw_trend(
         if not problem:
             text("p", "The history contains no identification of this valve.", "vf-none")
         return
+    buttons: dict[int | None, ui.element] = {}
     with element("div", "vf-filters", role="group", aria_label="Time range"):
         for name, span in {**RANGES, "all": None}.items():
-            with element("button", "vf-filter", type="button") as button:
-                ui.label(name)
-            button.on("click", lambda span=span: show(span))
+            pressed = str(span is None).lower()
+            buttons[span] = text("button", name, "vf-filter", type="button", aria_pressed=pressed)
+            buttons[span].on("click", lambda span=span: show(span))
+
+    def press(chosen: ui.element | None) -> None:
+        for one in buttons.values():
+            one.props["aria-pressed"] = str(one is chosen).lower()
 
     def show(span: int | None) -> None:
+        press(buttons[span])
         chart.run_chart_method("setOption", zoomed(time.time_ns(), span, zone))
         chart.run_chart_method("dispatchAction", WHOLE_AXIS)
 
@@ -162,6 +167,7 @@ def draw_trend(
         js_handler=f"() => {{ const one = getElement({chart.id}); if (!one.drags) {{"
         f"one.drags = true; one.chart.dispatchAction({json.dumps(DRAG_TO_ZOOM)}) }} }}",
     )
+    chart.on("chart:datazoom", lambda: press(None), js_handler="(e) => { if (e.batch) emit() }")
     text("p", _trend_words(kept), "vf-trend-words")
 
 
@@ -269,7 +275,7 @@ def draw_files(files: list[OfferedFile], zone: ZoneInfo) -> None:
         for one in files:
             when = datetime.fromtimestamp(one.time, timezone.utc).astimezone(zone)
             with element("tr"), element("td", "vf-words"):
-                address = f"/files/{quote(one.kind)}/{quote(one.path)}"
-                link(one.label, address, "vf-link", target="_blank", rel="noopener")
-                about = f"{one.kind}, {one.size / 1e6:.2f} MB"
+                link(one.label, one.address, "vf-link", target="_blank", rel="noopener")
+                size = f"{one.size / 1e6:.1f} MB" if one.size >= 1e6 else f"{one.size / 1e3:.0f} kB"
+                about = f"{one.kind}, {size}"
                 text("small", f"{about}, {when:%Y-%m-%d %H:%M} {when.tzname()}", "vf-about")

@@ -217,6 +217,8 @@ class _ValveActions:
             for service, (title, _) in _ACTIONS.items():
                 self._buttons.append(self._button(service, title))
         self._answer = AnswerLine()
+        self._report = link("Open the report", "", "vf-link", target="_blank", rel="noopener")
+        self._report.set_visibility(False)
 
     def _button(self, service: str, title: str) -> ui.button:
         async def act() -> None:
@@ -293,6 +295,7 @@ class _ValveActions:
         self._busy = (service, time.monotonic())
         for button in self._buttons:
             button.disable()
+        self._report.set_visibility(False)
         self._answer.say("busy", f"{_ACTIONS[service][1]} …")
         try:
             answer = await self._context.call(self._node, service)
@@ -303,6 +306,12 @@ class _ValveActions:
             button.enable()
         title = _ACTIONS[service][0].rstrip(" …")
         words = printable(answer.message, 2000) or "done"
+        files = ValveFiles.of(self._context.options)
+        if service == "report" and answer.success and (written := files.report(answer.message)):
+            words = "written"
+            self._report.props["href"] = written
+            self._report.set_visibility(True)
+            ui.navigate.to(written, new_tab=True)
         self._answer.say("ok" if answer.success else "error", f"{title}: {words}")
         self._done()
 

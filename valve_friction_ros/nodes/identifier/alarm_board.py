@@ -27,6 +27,7 @@ from valve_friction_ros.health.alarms import (
     AlarmKind,
     AlarmRequest,
     Condition,
+    alarm_summary,
     all_followed,
     all_requested,
 )
@@ -242,7 +243,7 @@ class AlarmBoard:
             self._under_way = None  # it was made earlier
         self._take(events)
         self._on_record = dict(self.alarms)
-        return "; ".join(str(one.alarm) for one in events) + self._history.reservation
+        return alarm_summary(one.alarm for one in events) + self._history.reservation
 
     # Diagnostics
 
