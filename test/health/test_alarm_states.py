@@ -111,6 +111,20 @@ def test_shelving_ends_by_itself_and_the_condition_decides():
     assert (cleared.action, cleared.alarm.state) == (AlarmAction.CLEAR, AlarmState.RETURNED)
 
 
+@pytest.mark.parametrize(
+    ("action", "longest"),
+    [(AlarmAction.SHELVE, LONGEST_SHELVING), (AlarmAction.TAKE_OUT, LONGEST_ABSENCE)],
+)
+def test_a_clock_that_is_set_back_does_not_suppress_an_alarm_for_years(action, longest):
+    """The alarm was raised, and suppressed, ten years ahead; a clock ahead by an hour is allowed."""
+    hour = 3_600_000_000_000
+    asked = request(action, duration=longest / 1e9)
+    suppressed = requested(after(WARN), asked, NOW).alarm
+    assert not followed_by(suppressed, WARN, NOW - hour)
+    (event,) = followed_by(suppressed, WARN, NOW - 10 * 366 * 24 * hour)
+    assert (event.action, event.alarm.state) == (AlarmAction.EXPIRE, AlarmState.UNACKNOWLEDGED)
+
+
 def test_an_event_holds_who_and_what_and_the_sentence_stays():
     event = requested(after(WARN), request(AlarmAction.ACKNOWLEDGE, " repack on Monday "), NOW)
     assert (event.who, event.text) == ("A. Operator", "repack on Monday")

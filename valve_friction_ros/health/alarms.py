@@ -147,6 +147,8 @@ LONGEST_SHELVING = 30 * 24 * _HOUR
 """Longest time of shelving, ns. Chosen: a forgotten alarm comes back."""
 LONGEST_ABSENCE = 366 * 24 * _HOUR
 """Longest time, ns, out of service. Chosen: a turnaround is planned for less than a year ahead."""
+_SKEW = 24 * _HOUR
+"""Chosen: clocks that differ by more than this, ns, have been set."""
 _LONGEST_NAME, _LONGEST_TEXT = 80, 500
 
 
@@ -234,6 +236,18 @@ class Alarm:
         """Its state, and the end of a suppression."""
         end = "" if self.until is None else f" until {utc_minute(self.until)}"
         return f"{self.state.value}{end}"
+
+    def has_expired(self, time: int) -> bool:
+        """Return whether shelving or the time out of service has ended by a time, ns.
+
+        One that ends later than anybody may ask for was begun by a clock that has been set back
+        since: it would suppress the alarm for years.
+        """
+        if self.until is None:
+            return False
+        is_shelved = self.state is AlarmState.SHELVED
+        longest = LONGEST_SHELVING if is_shelved else LONGEST_ABSENCE
+        return not 0 < self.until - time <= longest + _SKEW
 
     def __str__(self) -> str:
         """Return its kind and standing on one line."""
@@ -345,7 +359,7 @@ def _stepped(alarm: Alarm, action: AlarmAction, time: int, condition: Condition)
 def followed_by(alarm: Alarm, condition: Condition, time: int) -> tuple[AlarmEvent, ...]:
     """Return the events of the clock and the valve on an alarm at a time, ns: none, one or two."""
     events = []
-    if alarm.until is not None and time >= alarm.until:
+    if alarm.has_expired(time):
         events.append(_stepped(alarm, AlarmAction.EXPIRE, time, alarm.condition))
         alarm = events[-1].alarm
     before, now = alarm.condition.level, condition.level
