@@ -116,7 +116,7 @@ def test_shelving_ends_by_itself_and_the_condition_decides():
     [(AlarmAction.SHELVE, LONGEST_SHELVING), (AlarmAction.TAKE_OUT, LONGEST_ABSENCE)],
 )
 def test_a_clock_that_is_set_back_does_not_suppress_an_alarm_for_years(action, longest):
-    """The alarm was raised, and suppressed, ten years ahead; a clock ahead by an hour is allowed."""
+    """It was raised and suppressed ten years ahead; a clock may be ahead by an hour."""
     hour = 3_600_000_000_000
     asked = request(action, duration=longest / 1e9)
     suppressed = requested(after(WARN), asked, NOW).alarm
