@@ -564,6 +564,24 @@ class TestUnreadableFiles:
             "cannot be read as CSV: a quote is not closed within 1048576"
         )
 
+    def test_more_columns_than_a_spreadsheet(self, write):
+        """It was analysed for minutes."""
+        wide = ",1" * 20_000
+        path = write([HEADER + wide, *(row + wide for row in GOOD)])
+        assert "20003 columns, more than a spreadsheet has" in refused(path)
+
+    def test_wide_rows(self, write):
+        """Fewer are looked at; all are read."""
+        wide = ",1" * 9_000
+        assert_good(read_csv(write([HEADER + wide, *(row + wide for row in GOOD)])))
+
+    def test_a_compressed_file_of_matlab(self, tmp_path):
+        """Its size is that of its signals, not of the file."""
+        signals = {name: np.zeros(100_000) for name in ("t", "p_bar", "x_mm")}
+        scipy.io.savemat(tmp_path / "a.mat", signals, do_compression=True)
+        message = refused(tmp_path / "a.mat", form=Columns(maximum_megabytes=2.0))
+        assert "2.4 MB, unpacked: raise maximum_megabytes" in message
+
     def test_gzip_damaged(self, write):
         """At half its length, in the first block (3 is no type of one), and in the checksum."""
         random = np.random.default_rng(2)

@@ -29,7 +29,7 @@ import sys
 import tempfile
 import zipfile
 import zlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextvars import ContextVar
 from dataclasses import dataclass
 from datetime import datetime
@@ -95,6 +95,12 @@ PROGRESS: ContextVar[Callable[[float], None] | None] = ContextVar("progress", de
 
 LOOKED_AT = 300
 """Rows analysed before a table is read. Chosen: more than any preamble of an export."""
+
+_LOOKED_AT_SIZE, _LEAST_LOOKED_AT = 1 << 18, 40
+"""Characters after which fewer rows are analysed, and the least rows. Chosen: a second."""
+
+_MOST_COLUMNS = 16_384
+"""Most columns of a text, as of a sheet in a workbook."""
 
 _MARKS = (
     (codecs.BOM_UTF8, "utf-8-sig"),
@@ -347,12 +353,24 @@ def open_raw(path: Path, form: Columns) -> RawTable:
             with io.BufferedReader(_Bounded(place, form.maximum_megabytes), _PIECE) as stream:
                 encoding = form.encoding or encoding_of(stream.peek(_PIECE)[:_PIECE])
             with _text(place, form, encoding) as text:
-                head = tuple(itertools.islice(text, LOOKED_AT))
+                head = _head(text)
             _require_table(head)
             table = RawTable(path, form, place, head, encoding=encoding)
     if not any(line.strip() for line in table.head) and not any(map(any, table.cells)):
         raise ValueError(f"{path}: the file is empty")
     return table
+
+
+def _head(text: Iterable[str]) -> tuple[str, ...]:
+    """Return the first lines of a text; of wide lines fewer."""
+    head: list[str] = []
+    size = 0
+    for line in itertools.islice(text, LOOKED_AT):
+        head.append(line)
+        size += len(line)
+        if size > _LOOKED_AT_SIZE and len(head) >= _LEAST_LOOKED_AT:
+            break
+    return tuple(head)
 
 
 def _require_table(head: Sequence[str]) -> None:
@@ -362,6 +380,9 @@ def _require_table(head: Sequence[str]) -> None:
         raise ValueError("a page in HTML or XML: save it from a spreadsheet as .xlsx or CSV")
     if _JSON.match(start):
         raise ValueError("JSON: save it as CSV, one row for each time")
+    entries = max((line.count(mark) for line in head for mark in "\t;,|"), default=0) + 1
+    if entries > _MOST_COLUMNS:
+        raise ValueError(f"{entries} columns, more than a spreadsheet has: keep those of the valve")
     if len(_CONTROL.findall(start)) > max(_FEW_CONTROL, _MOST_CONTROL * len(start)):
         raise ValueError("a binary file: export it as CSV, .xlsx, Parquet or MAT (version 7)")
 
@@ -451,11 +472,15 @@ def _parquet(path: Path, _: Columns, places: Sequence[int] | None) -> Iterator["
 
 def _matlab(path: Path, form: Columns, places: Sequence[int] | None) -> Iterator["pd.DataFrame"]:
     import pandas as pd  # noqa: PLC0415 - slow to import
-    from scipy.io import loadmat  # noqa: PLC0415
+    from scipy.io import loadmat, whosmat  # noqa: PLC0415
 
-    if path.stat().st_size / 1e6 > form.maximum_megabytes:
-        raise ValueError("it is larger than maximum_megabytes (--maximum-megabytes)")
     try:
+        sizes = [math.prod(shape) for _, shape, _ in whosmat(path)]
+        if 8 * sum(sizes) > 1e6 * form.maximum_megabytes:
+            raise ValueError(
+                f"{8e-6 * sum(sizes):.4g} MB, unpacked: raise maximum_megabytes "
+                "(--maximum-megabytes), or save the signals of the valve only"
+            )
         found = loadmat(path, squeeze_me=True)
     except NotImplementedError:
         raise ValueError(

@@ -243,7 +243,7 @@ def _noise_remarks(name: str, signal: StampedSignal) -> list[str]:
         lasting = stamped_noise(StampedSignal(signal.time[::apart], signal.value[::apart]))
         if lasting > _COLOURED * noise:
             remarks.append(
-                f"the noise of {name} is not white: {lasting / noise:.2g} times as large over "
+                f"the noise of {name} is not white: {two_digits(lasting / noise)} times as large over "
                 f"{1e3 * _LASTING:g} ms as between successive samples"
             )
     return remarks
