@@ -572,8 +572,8 @@ class TestUnreadableFiles:
 
     def test_wide_rows(self, write):
         """Fewer are looked at; all are read."""
-        wide = ",1" * 9_000
-        assert_good(read_csv(write([HEADER + wide, *(row + wide for row in GOOD)])))
+        header, wide = HEADER + ",other" * 9_000, ",1" * 9_000
+        assert_good(read_csv(write([header, *(row + wide for row in GOOD)])))
 
     def test_a_compressed_file_of_matlab(self, tmp_path):
         """Its size is that of its signals, not of the file."""

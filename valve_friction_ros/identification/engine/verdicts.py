@@ -243,8 +243,8 @@ def _noise_remarks(name: str, signal: StampedSignal) -> list[str]:
         lasting = stamped_noise(StampedSignal(signal.time[::apart], signal.value[::apart]))
         if lasting > _COLOURED * noise:
             remarks.append(
-                f"the noise of {name} is not white: {two_digits(lasting / noise)} times as large over "
-                f"{1e3 * _LASTING:g} ms as between successive samples"
+                f"the noise of {name} is not white: {two_digits(lasting / noise)} times as large "
+                f"over {1e3 * _LASTING:g} ms as between successive samples"
             )
     return remarks
 
