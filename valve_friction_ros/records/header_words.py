@@ -10,7 +10,7 @@
 """Interpretation of headers, tags and cells: quantity, unit and valve; number and unit."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -243,3 +243,43 @@ def _converted(text: str, decimal: str, unit: str) -> float:
             one, other = known[own], known[unit]
             return value * one.multiplier / one.divisor * other.divisor / other.multiplier
     return np.nan
+
+
+_GOOD = re.compile(
+    r"(good|ok|gut|valid|true|g|yes|ja|gültig|bon(ne)?|buen[ao]?|buon[ao]?|boa|goed)\b.*"
+    r"|\(?good\b.*",
+    re.IGNORECASE,
+)
+_OPC_UA_GOOD = re.compile("0x[0-3][0-9a-f]{7}", re.IGNORECASE)
+"""Status codes of OPC UA whose upper two bits are 0."""
+_DOUBT = re.compile("questionable|substituted|bad|invalid", re.IGNORECASE)
+_TRUE_OR_FALSE = re.compile("true|false|0|1", re.IGNORECASE)
+_OPC_GOOD, _OPC_MOST, _CERTAIN = 192, 255, 100
+"""Range of good OPC qualities, and the confidence of a historian in a measured value."""
+
+
+def told_good(
+    name: str, cells: Sequence[str], decimal: str, given: str
+) -> Callable[[str], bool] | None:
+    """Return how to tell good qualities in a column, by the `given` words or its cells.
+
+    None if these do not say which are good.
+    """
+    read = [number_and_unit(cell, decimal) for cell in cells]
+    numbers = [one[0] for one in read if one is not None]
+    if not given and _DOUBT.search(name) and all(map(_TRUE_OR_FALSE.fullmatch, cells)):
+        given = "false,0"
+    if given:
+        words = {word.strip().casefold() for word in given.split(",")}
+        return lambda cell: cell.strip().casefold() in words
+    if len(numbers) == len(cells):
+        is_opc = any(_OPC_GOOD <= value <= _OPC_MOST for value in numbers)
+        least = _OPC_GOOD if is_opc else max(numbers)
+        if is_opc or least == _CERTAIN:
+            return lambda cell: bool(number_and_unit(cell, ".")) and float(cell) >= least
+        if len(set(numbers)) == 1:  # of a code, a greater number is not a better one
+            return lambda cell: bool(number_and_unit(cell, ".")) and float(cell) == least
+    known = next((one for one in (_OPC_UA_GOOD, _GOOD) if any(map(one.fullmatch, cells))), None)
+    if known:
+        return lambda cell: known.fullmatch(cell.strip()) is not None
+    return (lambda cell: cell.strip() == cells[0]) if len(set(cells)) == 1 else None

@@ -425,6 +425,11 @@ class Look:
         return self.rows[self.start - 1][0] if self.start else 0
 
     @property
+    def preamble(self) -> str:
+        """All texts above the values."""
+        return " ".join(cell for _, row in self.rows[: self.start] for cell in row)
+
+    @property
     def names(self) -> str:
         """The names of the first columns, for a question."""
         names = [column.name[:LONGEST_QUOTE] or "''" for column in self.columns[:_MOST_NAMES]]

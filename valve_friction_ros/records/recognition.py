@@ -25,7 +25,13 @@ from typing import Any
 
 from valve_friction_ros.records.columns import KNOWN_UNITS, Columns
 from valve_friction_ros.records.files import table_stem
-from valve_friction_ros.records.header_words import Named, named, number_and_unit, plain_name
+from valve_friction_ros.records.header_words import (
+    Named,
+    named,
+    number_and_unit,
+    plain_name,
+    told_good,
+)
 from valve_friction_ros.records.layout import (
     OWN,
     Layout,
@@ -44,22 +50,10 @@ from valve_friction_ros.records.written_times import (
     is_time_of_day,
 )
 
-_MOST_CHOICES, _MOST_TAGS = 6, 10_000
+_MOST_CHOICES, MOST_TAGS = 6, 10_000
 _COARSE, _COARSE_IF_NAMED = 0.5, 60.0
 """Largest step of a time without a unit that is in seconds; the same of a column that is named in
 the format. Others may be milliseconds. Chosen: a sample per minute shows no motion."""
-_GOOD = re.compile(
-    r"(good|ok|gut|valid|true|g|yes|ja|gültig|bon(ne)?|buen[ao]?|buon[ao]?|boa|goed)\b.*"
-    r"|\(?good\b.*",
-    re.IGNORECASE,
-)
-_OPC_UA_GOOD = re.compile("0x[0-3][0-9a-f]{7}", re.IGNORECASE)
-"""Status codes of OPC UA whose upper two bits are 0."""
-_DOUBT = re.compile("questionable|substituted|bad|invalid", re.IGNORECASE)
-_TRUE_OR_FALSE = re.compile("true|false|0|1", re.IGNORECASE)
-_OPC_GOOD, _OPC_MOST, _CERTAIN = 192, 255, 100
-"""Range of good OPC qualities, and the confidence of a historian in a measured value."""
-
 _MILLISECONDS = re.compile(r"milli\w*|m ?sec|ms|sub ?sec\w*", re.IGNORECASE)
 """Headers of a column of milliseconds next to a time of day."""
 
@@ -67,7 +61,7 @@ _NANOSECONDS = re.compile(r"n(?:ano)?_?s(?:ec(?:ond)?s?)?$", re.IGNORECASE)
 _SINCE_1970 = re.compile(r"1\d{9}")
 """Headers of nanoseconds next to seconds, and these seconds."""
 
-_LONGEST_TRAVEL, _LEAST_PRESSURE = 0.5, 2e3
+_LONGEST_TRAVEL, LEAST_PRESSURE = 0.5, 2e3
 """Longest travel of a stem, m, and least pressure of a moving actuator, Pa: a percentage is not
 below the former, a pressure in bar or kPa not above the latter.
 
@@ -147,14 +141,10 @@ class _Recognition(Look):
     def _are_stamps(self, whole: SeenColumn, rest: SeenColumn) -> bool:
         """Return whether two columns are seconds since 1970 and nanoseconds, as of ROS stamps."""
         is_named = _NANOSECONDS.search(rest.name) is not None or not self.start
-        cells = [*whole.filled, *rest.filled]
-        return (
-            is_named
-            and all(map(str.isdigit, cells))
-            and all(map(_SINCE_1970.fullmatch, whole.filled))
-            and max(map(int, rest.filled), default=0) > 1e6
-            and max(map(len, rest.filled)) <= len("999999999")
-        )
+        is_since = is_named and all(map(_SINCE_1970.fullmatch, whole.filled))
+        if not (is_since and rest.filled and all(map(str.isdigit, rest.filled))):
+            return False
+        return 1e6 < max(map(int, rest.filled)) < 1e9
 
     def _written(self) -> list[SeenColumn]:
         """Return the columns that may be times in an unknown format."""
@@ -253,19 +243,17 @@ class _Recognition(Look):
 
     def _stated_zone(self) -> str:
         """Return the time zone named above the values, such as Europe/Berlin, or ''."""
-        above = " ".join(cell for _, row in self.rows[: self.start] for cell in row)
-        found = re.findall(r"\b[A-Z][A-Za-z]+/[A-Z][A-Za-z_]+\b", above)
+        found = re.findall(r"\b[A-Z][A-Za-z]+/[A-Z][A-Za-z_]+\b", self.preamble)
         known: list[str] = [
             one for one in dict.fromkeys(found) if one in zoneinfo.available_timezones()
         ]
-        offsets = re.findall(r"\b(?:UTC|GMT) ?([+\-−]\d{1,2})(?::?00)?(?![:\d])", above)
+        offsets = re.findall(r"\b(?:UTC|GMT) ?([+\-−]\d{1,2})(?::?00)?(?![:\d])", self.preamble)
         # the Etc zones count westwards
         known += [f"Etc/GMT{-int(one.replace('−', '-')):+d}" for one in dict.fromkeys(offsets)]
         return known[0] if len(known) == 1 else ""
 
     def _ask_zone(self) -> None:
-        above = " ".join(cell for _, row in self.rows[: self.start] for cell in row)
-        if unclear := _UNCLEAR_ZONE.search(above):
+        if unclear := _UNCLEAR_ZONE.search(self.preamble):
             self.questions.append(
                 f"the time zone that {quoted(unclear[0])} above the values means (--time-zone, "
                 "such as Europe/Berlin)"
@@ -332,9 +320,9 @@ class _Recognition(Look):
                 cells = tuple(str(cell).strip() for cell in row)
                 if cells[0]:
                     found.setdefault(cells)
-            if len(found) > _MOST_TAGS:
+            if len(found) > MOST_TAGS:
                 raise ValueError(
-                    f"{self.raw.path}: more than {_MOST_TAGS} tags: give the --tag-column"
+                    f"{self.raw.path}: more than {MOST_TAGS} tags: give the --tag-column"
                 )
         return list(found)
 
@@ -411,30 +399,13 @@ class _Recognition(Look):
 
     def _goodness(self, column: SeenColumn) -> Callable[[str], bool]:
         cells = column.filled
-        numbers = self._numbers(column)
-        good = self.form.good_quality
-        if not good and _DOUBT.search(column.name) and all(map(_TRUE_OR_FALSE.fullmatch, cells)):
-            good = "false,0"
-        if good:
-            words = {word.strip().casefold() for word in good.split(",")}
-            return lambda cell: cell.strip().casefold() in words
-        if len(numbers) == len(cells):
-            is_opc = any(_OPC_GOOD <= value <= _OPC_MOST for value in numbers)
-            least = _OPC_GOOD if is_opc else max(numbers)
-            if is_opc or least == _CERTAIN:
-                return lambda cell: bool(number_and_unit(cell, ".")) and float(cell) >= least
-            if len(set(numbers)) == 1:  # of a code, a greater number is not a better one
-                return lambda cell: bool(number_and_unit(cell, ".")) and float(cell) == least
-        known = next((one for one in (_OPC_UA_GOOD, _GOOD) if any(map(one.fullmatch, cells))), None)
-        if known:
-            return lambda cell: known.fullmatch(cell.strip()) is not None
-        if len(set(cells)) == 1:
-            return lambda cell: cell.strip() == cells[0]
-        said = ", ".join(map(quoted, [*dict.fromkeys(cells)][:_MOST_CHOICES]))
-        self.questions.append(
-            f"which of {quoted(column.name)} are good: {said} (--good-quality, with commas)"
-        )
-        return lambda _: True
+        tell = told_good(column.name, cells, self.decimal, self.form.good_quality)
+        if tell is None:
+            said = ", ".join(map(quoted, [*dict.fromkeys(cells)][:_MOST_CHOICES]))
+            self.questions.append(
+                f"which of {quoted(column.name)} are good: {said} (--good-quality, with commas)"
+            )
+        return tell or (lambda _: True)
 
     def signals(self) -> dict[str, tuple[TableSignal, ...]]:
         """Return the signals of each valve; open points become questions."""
@@ -577,7 +548,7 @@ def _may_be_si(quantity: str, numbers: Sequence[float]) -> bool:
     largest = max(map(abs, numbers), default=0.0)
     if quantity == "position":
         return largest < _LONGEST_TRAVEL
-    return quantity != "pressure" or largest > _LEAST_PRESSURE
+    return quantity != "pressure" or largest > LEAST_PRESSURE
 
 
 def _as_written(label: str, name: str) -> str:

@@ -26,7 +26,7 @@ from valve_friction_ros.records.columns import Columns
 from valve_friction_ros.records.files import cause_of
 from valve_friction_ros.records.header_words import numbers
 from valve_friction_ros.records.layout import Layout, TableSignal, quoted
-from valve_friction_ros.records.recognition import recognized
+from valve_friction_ros.records.recognition import LEAST_PRESSURE, MOST_TAGS, recognized
 from valve_friction_ros.records.recorded_valve import Stretch
 from valve_friction_ros.records.table_rows import open_raw
 from valve_friction_ros.records.units import PERCENT, PRESSURE_UNITS, SHARES
@@ -38,7 +38,6 @@ if TYPE_CHECKING:
 
 _MOST_WORDS = 4
 """Most kinds of bad entries that a message names. Chosen: the message stays on one line."""
-_MOST_TAGS = 10_000
 _MOST_NAMES = 6
 _MOST_SPANS = 3.0
 """Accepted range of a share, over its span, as -100 to 200 %; a number beyond it, such as -9999,
@@ -247,7 +246,7 @@ class _Reader:
         texts = cells[bad].astype(str).str.strip()
         counted = texts.value_counts()
         part.bad.update({str(word): int(count) for word, count in counted.items()})
-        if len(part.bad) > _MOST_TAGS:
+        if len(part.bad) > MOST_TAGS:
             part.bad = Counter({"": part.bad.total()})
         if not part.example[0]:
             name = part.signal.name
@@ -543,8 +542,6 @@ def fault_of(read: ReadSignal, form: Columns) -> str:
 
 _LARGEST_FRACTION, _LEAST_SPAN = 1.05, 0.05
 """A share with such values and such a span is rather a fraction than a percentage. Chosen."""
-_LEAST_PRESSURE = 2e3
-"""Pressure, Pa, that a moving actuator exceeds. Chosen: 0.02 bar."""
 
 
 def _unlikely_unit(read: ReadSignal, given: Columns) -> str:
@@ -560,7 +557,7 @@ def _unlikely_unit(read: ReadSignal, given: Columns) -> str:
     if unit == PERCENT and low > -_LEAST_SPAN and low + _LEAST_SPAN < high < _LARGEST_FRACTION:
         return f"{what} (--{quantity}-unit fraction or --{quantity}-unit percent)"
     size = PRESSURE_UNITS.get(unit)
-    if size and max(abs(low), abs(high)) * size.multiplier / size.divisor < _LEAST_PRESSURE:
+    if size and max(abs(low), abs(high)) * size.multiplier / size.divisor < LEAST_PRESSURE:
         return (
             f"{what}, in {unit} too little to move an actuator (--{quantity}-unit, or --decimal if "
             "these are thousands)"
