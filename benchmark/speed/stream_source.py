@@ -44,8 +44,13 @@ _BLOCKS_PER_SECOND = 10
 
 
 def _signals(rate: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return ten seconds of a slow sine of the bench valve with sensor noise, to repeat."""
-    pressure = model.SineWave(period=5.0).sample(np.arange(10 * rate) / rate)
+    """Return ten seconds of two strokes of the bench valve with sensor noise, to repeat.
+
+    The stem rests between them, so that they are moves in service.
+    """
+    wave = model.SineWave()
+    places = [wave.low, wave.high, wave.high, wave.low, wave.low]
+    pressure = np.interp(np.arange(10 * rate) / rate, [0.0, 3.0, 5.0, 8.0, 10.0], places)
     stem = model.simulate(model.BENCH_VALVE, model.LOW_FRICTION, pressure, 1 / rate)
     noisy = model.SensorNoise(position=10e-6, pressure=100.0, seed=1).applied_to(
         model.Recording(1 / rate, pressure, stem.position)
