@@ -201,6 +201,7 @@ class _Plant:
     ) -> None:
         office, *others = hosts
         self.office, self.database, self._options = office, database, options
+        self.has_server: bool = options.server
         self.begin = time.monotonic()
         words = ("--ros-args", "-p", "history_file:=''")
         self.dashboard = office.start_module("benchmark.hosts_node", "dashboard", *words)
@@ -325,7 +326,8 @@ def _death(plant: _Plant) -> Iterator[Row]:
 
 def _partition(plant: _Plant, seconds: float) -> Iterator[Row]:
     """Unplug a host for a while."""
-    cut, database = plant.hosts[-1], plant.database
+    # A client that starts on the host while it is cut off from a discovery server finds nothing.
+    cut, database = plant.hosts[-1], None if plant.has_server else plant.database
     begin = time.monotonic()
     cut.host.plug(False)
     yield plant.truth("a host is cut off: its valves are silent", lambda: plant.is_silent(cut))

@@ -33,6 +33,7 @@ from std_msgs.msg import Float64, Header
 from std_srvs.srv import Trigger
 
 from valve_friction_ros.nodes.dashboard import status_of, statuses_in
+from valve_friction_ros.nodes.identifier.status import EstimateTopic
 from valve_friction_ros.nodes.identifier.valve_inputs import ValveInputs, _Input
 from valve_friction_ros.nodes.plumbing import messages, running
 from valve_friction_ros.nodes.plumbing.messages import (
@@ -489,6 +490,24 @@ def said(message="friction normal", age="1.0", ratio="1.02", count="5"):
     pairs = {"friction_ratio": ratio, "estimate_age [s]": age, "buffered_samples": count}
     values = [KeyValue(key=key, value=value) for key, value in pairs.items()]
     return DiagnosticStatus(name="/v/identifier: friction", message=message, values=values)
+
+
+@pytest.mark.parametrize(
+    ("given", "waits"),
+    [
+        ({}, True),
+        ({"ROS_DISCOVERY_SERVER": "10.0.0.1:11811"}, False),
+        ({"ROS_DISCOVERY_SERVER": "10.0.0.1:11811", "ROS_SUPER_CLIENT": "TRUE"}, True),
+    ],
+)
+def test_a_discovery_server_tells_nobody_of_topics_not_yet_used(bench, monkeypatch, given, waits):
+    """A node that waited for the other side never met it, so its blocks were never received."""
+    for name, value in given.items():
+        monkeypatch.setenv(name, value)
+    node, _, _ = bench
+    PolledSubscription(node, Float64, "numbers", blocks(), is_optional=True)
+    EstimateTopic(node, is_wanted=True).publish(DiagnosticStatus())
+    assert bool(node.awaited) is bool(node.offered) is waits
 
 
 @pytest.mark.parametrize(("nodes", "polls"), [(1, 100), (50, 20), (500, 10)])

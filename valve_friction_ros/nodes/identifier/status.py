@@ -36,7 +36,7 @@ from valve_friction_ros.identification.published.sweep import Sweep
 from valve_friction_ros.identification.result import Result
 from valve_friction_ros.identification.settings import SLIDING, UNITS
 from valve_friction_ros.nodes.plumbing.messages import time_message
-from valve_friction_ros.nodes.plumbing.polled_node import PolledNode
+from valve_friction_ros.nodes.plumbing.polled_node import PolledNode, learns_of_all_topics
 from valve_friction_ros.nodes.plumbing.qos import LATCHED
 from valve_friction_ros.wording import Code, said, sentence
 
@@ -214,8 +214,8 @@ def _sweep_message(sweep: Sweep | None) -> Float64MultiArray:
 class EstimateTopic:
     """Publishes all knowledge about the valve in one message whenever it changes.
 
-    The publisher is created once the topic has a subscriber. Without the parameter `estimate_topic`
-    nothing is done.
+    The publisher is created once the topic has a subscriber, if that can be seen. Without the
+    parameter `estimate_topic` nothing is done.
     """
 
     def __init__(self, node: PolledNode, is_wanted: bool) -> None:
@@ -240,7 +240,7 @@ class EstimateTopic:
         begun = time.monotonic()
         if begun < self._look_at:
             return
-        if self._node.count_subscribers(self._topic):
+        if not learns_of_all_topics() or self._node.count_subscribers(self._topic):
             self._publisher = self._node.create_publisher(DiagnosticStatus, self._topic, LATCHED)
             del self._node.offered[self._topic]
         now = time.monotonic()

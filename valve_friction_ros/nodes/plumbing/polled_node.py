@@ -16,6 +16,7 @@ behaves the same: services work as those of other nodes, and a timer polls the s
 import contextlib
 import functools
 import inspect
+import os
 import threading
 import time
 import types
@@ -477,6 +478,15 @@ async def _answer(node: Node, service: Service, request: object, header: object)
     with _kept_to(node, service.srv_name):
         response = await await_or_execute(service.callback, request, service.srv_type.Response())
         service.send_response(response, header)
+
+
+def learns_of_all_topics() -> bool:
+    """Return whether a node learns of topics that it neither publishes nor subscribes to.
+
+    A discovery server of Fast DDS tells it of no others.
+    """
+    sees_all = os.environ.get("ROS_SUPER_CLIENT", "").lower() in ("true", "1")
+    return sees_all or not os.environ.get("ROS_DISCOVERY_SERVER")
 
 
 def lack_of_time(node: Node) -> str:

@@ -28,7 +28,11 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.subscription import Subscription
 
-from valve_friction_ros.nodes.plumbing.polled_node import NeverReady, PolledNode
+from valve_friction_ros.nodes.plumbing.polled_node import (
+    NeverReady,
+    PolledNode,
+    learns_of_all_topics,
+)
 from valve_friction_ros.nodes.plumbing.qos import qos_overrides
 from valve_friction_ros.nodes.plumbing.rclpy_private import (
     heeds_groups,
@@ -102,7 +106,7 @@ class PolledSubscription(InputWatch):
     Parameters ``qos_overrides.…`` can override history, depth and reliability. The depth of
     `quality` must suffice for the messages between two calls of `take`. With `raw`, messages stay
     serialised. With `is_optional`, the subscription joins the graph only once `follow_publishers`
-    finds a publisher; until then its topic is among those `awaited` by the node.
+    finds a publisher, if it can; until then its topic is among those `awaited` by the node.
 
     Attributes
     ----------
@@ -132,7 +136,7 @@ class PolledSubscription(InputWatch):
         self._counter = LossCounter()
         self.has_more = False
         self._subscription: Subscription | None = None
-        if is_optional and not node.count_publishers(self.topic):
+        if is_optional and learns_of_all_topics() and not node.count_publishers(self.topic):
             node.awaited[self.topic] = self.type_name
         else:
             self._begin()
