@@ -424,6 +424,24 @@ class TestSearch:
         search = SimpleNamespace(may_go_on=True)
         assert _Search.is_enough(search, [ended(100.0, 1.0, 1.0, low_speed)]) is enough
 
+    @pytest.mark.parametrize(("fall", "is_followed"), [(10.0, False), (20.0, True)])
+    def test_the_valley_of_a_far_deeper_fit_is_followed_too(self, fall, is_followed):
+        """The fits along the valley of a fit that was not the best say nothing about its width."""
+        first, deep = fit_at(0.01, 100.0), fit_at(0.0, 100.0 - fall)
+        beside = fit_at(-0.001, 101.0 - fall)
+        search = SimpleNamespace(
+            prior=SimpleNamespace(profile=Profile.PLANT),
+            exact=None,
+            may_go_on=True,
+            best=lambda: first,
+            without_slip=lambda best: best,
+            profiled=lambda _: [deep],
+            fit=lambda *_: deep,
+            along_valley=lambda best: [beside] if best is deep else [],
+        )
+        expected = [deep, deep, first, *([beside] if is_followed else [])]
+        assert _Search.all_probable(search) == expected
+
 
 @pytest.mark.parametrize(
     ("cost", "is_apart", "residual", "is_taken"),

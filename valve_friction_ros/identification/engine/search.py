@@ -379,17 +379,22 @@ class _Search:
         """
         if not best.lags.any():
             return []
-        self.most_work = max(self.most_work, self.work + _FOR_LAGS)
-        follows, found = best.inflation <= NOISE_LIKE, []
-        if follows:
-            found = [*self.followed(best, -1.0), *self.followed(best, 1.0)]
+        found = self.along_valley(best)
         nearest_to_none = min([best, *found], key=lambda one: abs(one.lag))
         if abs(nearest_to_none.lag) > 0.5 * _first_step(best) and self.may_go_on:
             found.append(self.without_lag(best, nearest_to_none.at))
         is_possible = best.lag + _delay(best) < self.prior.lag.reach
+        follows = best.inflation <= NOISE_LIKE
         if follows and is_possible and "viscous_friction" in best.names and self.may_go_on:
             found.append(self.behind_slow_sensor(best))
         return found
+
+    def along_valley(self, best: PosteriorFit) -> list[PosteriorFit]:
+        """Fit at later and at earlier lags, if the best fit follows the stem."""
+        self.most_work = max(self.most_work, self.work + _FOR_LAGS)
+        if best.inflation > NOISE_LIKE:
+            return []
+        return [*self.followed(best, -1.0), *self.followed(best, 1.0)]
 
     def followed(self, best: PosteriorFit, way: float) -> list[PosteriorFit]:
         """Fit at later or earlier lags, each from the last probable fit."""
@@ -454,8 +459,11 @@ class _Search:
         lowest = _lowest([best, *others])
         if lowest is not best:
             deeper = self.fit(lowest.at, best.names, _MORE_STEPS, self.exact)
-            if deeper.objective < best.objective:
+            fall = best.objective - deeper.objective
+            if fall > 0.0:
                 best, others = deeper, [*others, best]
+            if fall > _IMPROBABLE * deeper.inflation:
+                others += self.along_valley(best)
         return [best, *others]
 
     def from_curves(self) -> list[Coordinates]:
