@@ -107,11 +107,15 @@ def test_it_needs_no_option(tmp_path, name):
     assert read(path).start_time == pytest.approx(BEGIN.timestamp())
 
 
-def test_bad_values_in_french(tmp_path):
+@pytest.mark.parametrize(
+    "words", [("Qualité", "Bonne", "Mauvaise"), ("Kwaliteit", "Goed", "Slecht")]
+)
+def test_bad_values_in_other_languages(tmp_path, words):
     """They were kept without a word."""
     path = tmp_path / "export.csv"
-    lines = WRITTEN["French"].splitlines()
-    lines[1] = lines[1].replace(f";{comma(BARS)[0]};", ";9,9;").replace("Bonne", "Mauvaise")
+    name, good, bad = words
+    lines = WRITTEN["French"].replace("Qualité", name).replace("Bonne", good).splitlines()
+    lines[1] = lines[1].replace(f";{comma(BARS)[0]};", ";9,9;").replace(good, bad)
     path.write_text("\n".join(lines))
     read(path, COUNT - 1)
 
@@ -152,6 +156,39 @@ def test_messages_printed_by_ros(tmp_path):
     assert record.pressure == pytest.approx(1e5 * np.array(BARS, float))
     assert record.position == pytest.approx(1e-3 * np.array(MILLIMETRES, float))
     assert record.start_time == pytest.approx(BEGIN.timestamp(), abs=1e-6)
+
+
+def test_messages_with_headers_in_files_of_their_own(tmp_path):
+    """The number of the message was taken for a second pressure, as the file has its name."""
+    number = [str(one) for one in range(COUNT)]
+    rest = [f"{one.microsecond * 1000}" for one in STAMPS]
+    head = "header.seq,header.stamp.secs,header.stamp.nsecs"
+    path, stem = tmp_path / "actuator_pressure.csv", tmp_path / "joint_states.csv"
+    pascals = [f"{1e5 * float(one):.0f}" for one in BARS]
+    path.write_text(table(f"{head},fluid_pressure", number, SECONDS, rest, pascals, mark=","))
+    stem.write_text(table(f"{head},position_0", number, SECONDS, rest, MILLIMETRES, mark=","))
+    form = Columns(position_unit="mm")
+    (found,) = read_recordings(path, VALVE, ReadingOptions(form, beside=(stem,)))
+    assert found.recording().pressure == pytest.approx(1e5 * np.array(BARS, float))
+
+
+def test_a_table_of_aveva(tmp_path):
+    """Its values come twice, and it has three qualities, of which 0 is good in one."""
+    rows = ["DateTime,TagName,Value,vValue,Quality,QualityDetail,OPCQuality"]
+    stamps = written("%Y-%m-%d %H:%M:%S.~")
+    for place, row in enumerate(zip(stamps, BARS, MILLIMETRES, strict=True)):
+        quality = "0,192,192" if place else "1,24,0"
+        for tag, value in zip(("FV1.PT", "FV1.ZT"), row[1:], strict=True):
+            rows.append(f"{row[0]},{tag},{value},{value},{quality}")
+    path = tmp_path / "export.csv"
+    path.write_text("\n".join(rows))
+    read(path, COUNT - 1, pressure_unit="bar", position_unit="mm")
+    path.write_text(path.read_text().replace(",Value,vValue,", ",first,second,"))
+    with pytest.raises(
+        ValueError, match=r"which column is the value \(--value-column first or"
+    ) as one:
+        read_recordings(path, VALVE)
+    assert "which tag is" not in str(one.value)
 
 
 def test_units_of_labview(tmp_path):

@@ -25,14 +25,15 @@ _WORDS = {
     "position": "position pos stem travel lift hub stellung weg opening öffnung oeffnung feedback "
     "readback rückmeldung displacement stroke ventilstellung stellweg stemposition "
     "course tige ouverture posición posicion carrera vástago posizione corsa posição curso "
-    "klepstand",
+    "klepstand abertura stellungsrückmeldung stellungsrueckmeldung",
     "pressure": "pressure druck press air luft stelldruck actuator diaphragm antriebsdruck p "
     "ventildruck pression presión presion pressione pressão pressao",
     "force": "force kraft load",
     "command": "setpoint sp op output out command cmd demand sollwert soll cv request target "
     "stellsignal stellgröße mv",
     "quality": "quality status qstatus confidence güte qualität qualitätscode qualitaet valid "
-    "questionable annotated good stat q dataintegrity qualité qualite calidad qualità qualidade",
+    "questionable annotated good stat q dataintegrity qualité qualite calidad qualità qualidade "
+    "kwaliteit kvalita jakość",
     "tag": "tag tagname tagid tagpath variablenname logname signalname parameter name point "
     "pointname signal series variable messstelle kanal sensor metric "
     "item id kks channel tags field varname",
@@ -103,7 +104,7 @@ def _unit_and_rest(text: str) -> tuple[str, str]:
 _PROVIDER = re.compile(r"^\[\w+\](?=[\w -]+/)")
 """Provider before the path of a tag of Ignition."""
 
-_PRESSURE_MESSAGE = re.compile(r"/.*[/.]fluid_pressure")
+_PRESSURE_MESSAGE = re.compile(r"(?:/.*[/.])?fluid_pressure")
 _JOINT_MESSAGE = re.compile(r"/.*/position(?:[/.\[]\w+\]?)?|/.*state.*[/.]position")
 
 

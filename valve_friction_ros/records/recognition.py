@@ -283,7 +283,8 @@ class _Recognition(Look):
             column = self.by_name(self.form.value_column, "--value-column")
             return column.place if column else -1
         numeric = self._values(times)
-        found = [one for one in numeric if one.said.quantity == "value"] or numeric
+        exact = [one for one in numeric if one.name.casefold() == "value"]
+        found = exact or [one for one in numeric if one.said.quantity == "value"] or numeric
         if len(found) == 1:
             return found[0].place
         self._ask_name("value", [one.name for one in found])
@@ -389,7 +390,9 @@ class _Recognition(Look):
         found = [one for one in self.columns if one.said.quantity == "quality" and one.filled]
         found = [one for one in found if one.place not in time]
         alike = [c for c in found if said.label and c.said.label == said.label]
-        beside = [c for c in found if c.place == place + 1] or (alike if len(found) > 1 else found)
+        of_opc = [c for c in found if "opc" in c.name.casefold() and self.tag_place is not None]
+        beside = [c for c in found if c.place == place + 1] or of_opc
+        beside = beside or (alike if len(found) > 1 else found)
         if not beside:
             return None
         column = beside[0]
@@ -450,6 +453,8 @@ class _Recognition(Look):
         own = next((one for one in self.given if plain_name(one) in plain_name(own)), own)
         by_name = []
         vague = [one for one in candidates if one[1].quantity in ("", "value")]
+        if any(one[1].quantity in ("pressure", "force", "position") for one in candidates):
+            of_name, vague = named([""]), []
         moving = [one for one in vague if len({*self._of_signal(one[0], one[2])}) > 1]
         if len(vague) > 1 and len(moving) == 1:
             candidates = [one for one in candidates if one not in vague or one in moving]
@@ -531,6 +536,10 @@ class _Recognition(Look):
         ]
         if texts and not (drives or positions) and self.tag_place is None:
             self._ask_name("tag", texts)
+            values = self._values({place for group in self.times for place in group})
+            if len(values) > 1:
+                self._ask_name("value", [one.name for one in values])
+        if self.asked & {"tag", "value"}:
             return
         for quantity, found in ((drive, drives), ("position", positions)):
             if len(found) == 1:
