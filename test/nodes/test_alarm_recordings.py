@@ -341,7 +341,7 @@ def test_friction_is_judged_against_the_baseline_in_force(bench):
     message = client.identified(TIGHT)
     _, page = report(client)
     assert page.status[:3] == ("red", "✗", "Excess friction")
-    assert page.lead.startswith("The friction is excessive, ")
+    assert page.lead.startswith("Replace the packing as soon as possible")
     assert [one for one in page.said("figcaption") if "Grey: the record of the baseline" in one]
     assert page.table("friction")["level"] == ("ERROR, NE 107 status signal F",)
     (shown,) = page.table("friction")["diagnosis"]

@@ -543,6 +543,8 @@ def test_of_a_valve_only_in_the_history_its_last_state_and_first_what_waits(plan
     row = tab.open("/?q=PAST-1").locator(".vf-row")
     row.get_by_text("friction normal").wait_for()
     row.get_by_text("150.0").wait_for(state="attached")
+    compared = tab.open(f"/compare?a={quote(valve.name)}&b={quote(valve.name)}")
+    compared.locator(".vf-compared tr", has_text="method").get_by_text("bench").first.wait_for()
     page = tab.open("/alarms?area=/past")
     page.locator("tbody tr:first-child").get_by_text("stuck").wait_for()
     page.locator("tbody tr:last-child").get_by_text("friction high").wait_for()

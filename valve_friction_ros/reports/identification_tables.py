@@ -38,6 +38,7 @@ from valve_friction_ros.reports.page import Column, PageTable, Verbatim
 from valve_friction_ros.wording import (
     in_zone,
     name_in_words,
+    number_and_width,
     percentage,
     ratio_interval,
     two_digits,
@@ -84,10 +85,17 @@ def _is_estimated(one: Mapping[str, Any]) -> bool:
 
 
 def _cells(name: str, one: Mapping[str, Any]) -> tuple[str, ...]:
+    value, ends = written(one["value"]), _NOTHING
+    if _is_estimated(one):
+        low, high = one["interval"]
+        value, *both = (
+            number_and_width(size, (high - low) / 2)[0] for size in (one["value"], low, high)
+        )
+        ends = " to ".join(both)
     return (
         _heading(name, one),
-        written(one["value"]),
-        " to ".join(map(written, one["interval"])) if _is_estimated(one) else _NOTHING,
+        value,
+        ends,
         ": ".join(filter(None, (one["verdict"], one["reason"]))),
         written(one["published"]),
     )

@@ -225,7 +225,7 @@ def date_line(record: IdentifiedRecord) -> str:
 
 _CHECK = "check the sensors and their mounting, then identify it again"
 _AS_BASELINE = "move the valve as for its baseline, and identify it again"
-_BASELINE = "set a baseline, the friction of the healthy valve"
+_BASELINE = "set a baseline, the friction of the healthy valve, to see whether it grows"
 
 _STATE_WORDS = {
     FrictionState.EXCESS: "the friction is excessive, {ratio}",
@@ -261,12 +261,12 @@ def what_to_do(diagnosis: Diagnosis, findings: Sequence[Finding] = ()) -> str:
 
 
 def diagnosis_sentence(record: IdentifiedRecord) -> str:
-    """Return the diagnosis in one sentence: finding, certainty, consequence and advice.
+    """Return the diagnosis in sentences: what to do, finding, certainty and consequence.
 
     It states the diagnosis of the monitor for readers outside control engineering. Other changes
     in the valve follow, one sentence each.
     """
-    friction = _friction(record)
+    friction, sureness = _friction(record), ""
     state = record.diagnosis.state
     if record.diagnosis.ratio is None and state in _STATE_WORDS:
         vanished = next(one for one in _frictions(record) if math.isnan(one.value))
@@ -281,10 +281,10 @@ def diagnosis_sentence(record: IdentifiedRecord) -> str:
         )
         advice = friction_advice(FrictionState.IMPOSSIBLE.name)
     else:
-        finding, advice = _found(record)
-    told = f"{_doubt(record)}{finding}{_consequence(record)}: {advice}"
-    sentences = (told, *(one.message for one in record.findings))
-    return " ".join(f"{capitalised(one)}." for one in sentences)
+        (finding, advice), sureness = _found(record), _sureness(friction)
+    told = (_doubt(record), advice, finding, sureness, _consequence(record))
+    others = (one.message for one in record.findings)
+    return " ".join(f"{capitalised(one)}." for one in filter(None, (*told, *others)))
 
 
 def _frictions(record: IdentifiedRecord) -> list[Parameter]:
@@ -311,11 +311,10 @@ def _found(record: IdentifiedRecord) -> tuple[str, str]:
     if diagnosis.ratio is None:
         size = with_width(friction.value, friction.half_width)
         advice = _BASELINE if record.baseline is None else _AS_BASELINE
-        found = f"the friction is {size} N{_sureness(friction)}"
-        return found, f"to find out whether it has grown, {advice}"
+        return f"the friction is {size} N", advice
     ratio = (
         f"{diagnosis.ratio.value:.2f} times that of the healthy valve "
-        f"({ratio_interval(diagnosis.ratio.low, diagnosis.ratio.high)}){_sureness(friction)}"
+        f"({ratio_interval(diagnosis.ratio.low, diagnosis.ratio.high)})"
     )
     if record.is_scaled:
         advice = (
@@ -333,8 +332,8 @@ def _sureness(friction: Parameter) -> str:
     """Return how far the number is limited, or an empty string if it is identified."""
     words = {
         Verdict.IDENTIFIED: "",
-        Verdict.WEAK: f", but this value is weak ({friction.reason})",
-        Verdict.FIXED: ", which was given and not identified",
+        Verdict.WEAK: f"this value is weak: {friction.reason}",
+        Verdict.FIXED: "it was given, not identified",
     }
     return words[friction.verdict]
 
@@ -346,7 +345,7 @@ def _doubt(record: IdentifiedRecord) -> str:
     explained = "force" if math.isnan(misfit.of_stem) else "stem's motion"
     return (
         "use this with caution, because the model does not describe this valve "
-        f"({misfit.words} of the {explained} remain unexplained): "
+        f"({misfit.words} of the {explained} remain unexplained)"
     )
 
 
@@ -354,4 +353,4 @@ def _consequence(record: IdentifiedRecord) -> str:
     share = dead_band(record.result, record.valve)
     if math.isnan(share) or share < 0:
         return ""
-    return f", and the stem ignores reversals smaller than {percentage(share)} of its travel"
+    return f"the stem ignores reversals smaller than {percentage(share)} of its travel"

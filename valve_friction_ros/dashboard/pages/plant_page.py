@@ -298,10 +298,11 @@ class _ComparePage:
     async def _side(self, side: str) -> ComparedIdentification | None:
         node, stamp = self._nodes[side], self._stamps[side]
         heard = self._context.plant.valve(node, time.monotonic())
-        if stamp == _NOW:
-            return None if heard is None else side_of_view(heard.view)
+        if stamp == _NOW and heard is not None and heard.silent_for is not None:
+            return side_of_view(heard.view)
         kept = await self._history(side)
-        found = (one for one in (kept.entries if kept else ()) if str(one.time) == stamp)
+        successes = [one for one in (kept.entries if kept else ()) if not one.refusal]
+        found = (one for one in reversed(successes) if stamp in (_NOW, str(one.time)))
         entry = next(found, None)
         return None if entry is None else side_of_entry(entry)
 
