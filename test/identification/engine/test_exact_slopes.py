@@ -257,7 +257,7 @@ class TestSensitivity:
         time = np.arange(2000) / 100
         pressure = 6.5e4 + 4e4 * np.sin(2 * np.pi * time / 9)
         stem = simulate(BENCH_VALVE, LOW_FRICTION, pressure, 0.01).position
-        record = fitted_record(stamped_record(Recording(0.01, pressure, stem)), BENCH_VALVE)
+        record = fitted_record(stamped_record(Recording(0.01, pressure, stem))[0], BENCH_VALVE)
         model = BroadModel(record, LOW_FRICTION.spring_constant)
         at, names = {**TRUTH, "start_position": record.start}, ("coulomb_friction", "slip_force")
         assert len(model.halves) == 1
