@@ -13,6 +13,7 @@ m·ẍ = S_a·(P − P_ref) − k·x − F_0 − friction, on a valve with round
 """
 
 import ast
+import math
 import re
 from collections import defaultdict
 from dataclasses import fields, replace
@@ -24,6 +25,7 @@ import pytest
 
 import valve_friction_ros as vf
 from valve_friction_ros.health import Baseline, DatedNumber, diagnose
+from valve_friction_ros.health.measured import Measured
 from valve_friction_ros.history import MONTH, trend_of
 from valve_friction_ros.identification import (
     IMPERFECTIONS_FOUND,
@@ -219,6 +221,30 @@ def test_no_function_is_longer_than_a_screen():
         and (size := (node.end_lineno or 0) - node.lineno + 1) > most
     ]
     assert not long
+
+
+def test_a_type_with_a_number_that_may_be_nan_is_equal_by_its_fields():
+    """Since Python 3.13 two equal dataclasses with a nan would differ."""
+    sources, wrong, checked = Path(vf.__file__).resolve().parent, [], 0
+    for path in sorted(sources.rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ClassDef):
+                rules = [ast.unparse(one) for one in node.decorator_list]
+                values = [ast.unparse(one) for one in node.body if isinstance(one, ast.AnnAssign)]
+                is_compared = any("frozen" in one and "eq=False" not in one for one in rules)
+                if is_compared and any(one.endswith("= math.nan") for one in values):
+                    checked += 1
+                    wrong += [node.name] if "equal_by_fields" not in rules else []
+    assert checked > 5
+    assert not wrong
+
+
+def test_equality_by_fields():
+    number = Measured(math.nan, low=1.0)
+    assert number == replace(number)
+    assert hash(number) == hash(replace(number))
+    assert number != replace(number, low=2.0)
+    assert number != "a number"
 
 
 def test_the_types_of_the_page_are_there():

@@ -37,6 +37,7 @@ from urllib.parse import SplitResult, unquote, urlsplit
 from urllib.request import getproxies, proxy_bypass
 
 from valve_friction_ros.health.levels import Level
+from valve_friction_ros.model.checks import equal_by_fields
 from valve_friction_ros.outside_text import is_loopback
 
 
@@ -55,6 +56,7 @@ class Letter(Protocol):
         """Return the letter as JSON."""
 
 
+@equal_by_fields
 @dataclass(frozen=True)
 class Alert:
     """A change of the level of a valve.

@@ -23,6 +23,7 @@ from valve_friction_ros.health.alarms import Alarm, AlarmKind, AlarmState, Condi
 from valve_friction_ros.health.baseline import BaselineLack, Lack
 from valve_friction_ros.health.comparison import Ratio
 from valve_friction_ros.health.levels import Level, StatusSignal
+from valve_friction_ros.model.checks import equal_by_fields
 from valve_friction_ros.outside_text import printable
 from valve_friction_ros.records.bags.topics import StreamNames
 from valve_friction_ros.wording import lasting, name_in_words, number_and_width, without_exponent
@@ -428,6 +429,7 @@ _TIDYING = 60.0
 """Time between two searches for valves to drop, s."""
 
 
+@equal_by_fields
 @dataclass(frozen=True)
 class Heard:
     """A valve and the age of its last message."""

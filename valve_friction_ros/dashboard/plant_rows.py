@@ -24,6 +24,7 @@ from valve_friction_ros.health.comparison import Ratio
 from valve_friction_ros.health.levels import Level, StatusSignal
 from valve_friction_ros.history import HistoryEntry
 from valve_friction_ros.identification.settings import SLIDING, UNITS
+from valve_friction_ros.model.checks import equal_by_fields
 from valve_friction_ros.outside_text import printable
 from valve_friction_ros.streams import utc
 from valve_friction_ros.wording import number_and_width, numbered, with_width
@@ -380,6 +381,7 @@ class ComparedIdentification:
     parameters: tuple[Quantity, ...]
 
 
+@equal_by_fields
 @dataclass(frozen=True)
 class Difference:
     """A parameter on both sides."""

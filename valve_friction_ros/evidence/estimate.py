@@ -51,6 +51,7 @@ from valve_friction_ros.identification.trust.verdict import (
     not_identifiable,
     with_verdict,
 )
+from valve_friction_ros.model.checks import equal_by_fields
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.wording import numbered, percentage
 
@@ -269,6 +270,7 @@ _MEAN_SLOPE = "the change of friction with speed across the moves, whatever its 
 _COULOMB = "moves in service do not separate friction into F_c and F_v"
 
 
+@equal_by_fields
 @dataclass(frozen=True)
 class FrictionChange:
     """A declared change of friction.
@@ -288,6 +290,7 @@ class FrictionChange:
     high: float
 
 
+@equal_by_fields
 @dataclass(frozen=True)
 class Evidence:
     """Combined result of the moves since the last change of friction.

@@ -23,7 +23,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from valve_friction_ros.held_signals import without_repeats
-from valve_friction_ros.model.checks import require_finite, require_non_negative, require_positive
+from valve_friction_ros.model.checks import (
+    equal_by_fields,
+    require_finite,
+    require_non_negative,
+    require_positive,
+)
 from valve_friction_ros.model.recording import StampedSignal
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.signals import position_noise, quantisation_step, runs_of
@@ -31,6 +36,7 @@ from valve_friction_ros.streams import DAY
 from valve_friction_ros.streams.samples import Arrivals, Kind, Samples
 
 
+@equal_by_fields
 @dataclass(frozen=True)
 class Move:
     """One motion of the stem in one direction, from rest to rest.

@@ -30,6 +30,7 @@ from valve_friction_ros.health.diagnosis import (
 )
 from valve_friction_ros.health.levels import Finding, Level, by_severity
 from valve_friction_ros.health.measured import Measured
+from valve_friction_ros.model.checks import equal_by_fields
 from valve_friction_ros.wording import Code, quoted, said, sentence
 
 _YEAR = 365.25 * 86_400e9
@@ -178,6 +179,7 @@ def shown_by(findings: Iterable[Finding]) -> Condition:
     return Condition(some[0].level, some[0].status_signal, "; ".join(one.message for one in some))
 
 
+@equal_by_fields
 @dataclass(frozen=True)
 class Delay:
     """On-delay and off-delay of a condition without an interval.

@@ -27,6 +27,7 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from valve_friction_ros.health.levels import Level, StatusSignal
+from valve_friction_ros.model.checks import equal_by_fields
 from valve_friction_ros.outside_text import printable
 from valve_friction_ros.wording import alarm_advice, utc_minute, utc_second
 
@@ -283,6 +284,7 @@ class AlarmEvent(NamedTuple):
     text: str = ""
 
 
+@equal_by_fields
 @dataclass(frozen=True)
 class AlarmRequest:
     """A person's request to an alarm.

@@ -20,7 +20,7 @@ from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.identification.result import Result
 from valve_friction_ros.identification.settings import SLIDING
 from valve_friction_ros.identification.trust.verdict import Parameter
-from valve_friction_ros.model.checks import require_non_negative, require_positive
+from valve_friction_ros.model.checks import equal_by_fields, require_non_negative, require_positive
 from valve_friction_ros.wording import (
     MORE_STROKES,
     Code,
@@ -51,6 +51,7 @@ class Lack(Enum):
     HEALTH = "in alarm"
 
 
+@equal_by_fields
 @dataclass(frozen=True)
 class BaselineLack:
     """An unmet condition of a baseline.
@@ -104,6 +105,7 @@ class BaselineRefusalError(RefusalError):
         self.lacks = lacks
 
 
+@equal_by_fields
 @dataclass(frozen=True)
 class SlidingFriction:
     """Friction work per distance of sliding, with the speed at which it was measured.
@@ -137,6 +139,7 @@ class SlidingFriction:
         return str(said(Code.SLIDING_SIZE, **vars(self)))
 
 
+@equal_by_fields
 @dataclass(frozen=True)
 class Baseline:
     """The healthy valve: Coulomb friction, sliding friction or both, and its other numbers.

@@ -25,6 +25,7 @@ from valve_friction_ros.health.valve_numbers import SHARED, SURE_SPRING
 from valve_friction_ros.identification.settings import SLIDING
 from valve_friction_ros.identification.trust.uncertainty import NORMAL_QUANTILE, SPEED_EXPONENT
 from valve_friction_ros.identification.trust.verdict import Parameter, Verdict
+from valve_friction_ros.model.checks import equal_by_fields
 from valve_friction_ros.wording import Code, Statement, said, sentence
 
 _ALIKE = 0.9
@@ -64,6 +65,7 @@ def friction_name(name: str, speed: float) -> Statement:
     return said(Code.FRICTION, of=name)
 
 
+@equal_by_fields
 @dataclass(frozen=True)
 class Ratio(Measured):
     """Present friction over baseline friction.

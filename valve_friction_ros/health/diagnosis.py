@@ -31,6 +31,7 @@ from valve_friction_ros.identification.rendering import plain
 from valve_friction_ros.identification.result import Result
 from valve_friction_ros.identification.settings import SLIDING
 from valve_friction_ros.identification.trust.verdict import Parameter
+from valve_friction_ros.model.checks import equal_by_fields
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.wording import Code, Statement, said, sentence
 
@@ -289,6 +290,7 @@ class Diagnosis:
         return f"{'unknown' if is_unknown else self.level.name}: {self.message}"
 
 
+@equal_by_fields
 @dataclass(frozen=True, kw_only=True)
 class EarlierEstimate:
     """A stored estimate with its diagnosis.

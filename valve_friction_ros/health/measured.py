@@ -14,9 +14,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, TypeVar
 
+from valve_friction_ros.model.checks import equal_by_fields
+
 _Kind = TypeVar("_Kind", bound="Measured")
 
 
+@equal_by_fields
 @dataclass(frozen=True)
 class Measured:
     """A number with its 95 % interval, SI unit.

@@ -21,6 +21,7 @@ from valve_friction_ros.health.baseline import Baseline
 from valve_friction_ros.health.diagnosis import FrictionLimits
 from valve_friction_ros.health.levels import Finding, Level, StatusSignal
 from valve_friction_ros.health.measured import Measured
+from valve_friction_ros.model.checks import equal_by_fields
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.streams import Samples
@@ -45,6 +46,7 @@ _MOST_BLOCKS = 1000
 """Most means of the pressure that wait for a position; the oldest are dropped."""
 
 
+@equal_by_fields
 @dataclass(frozen=True)
 class Standstill:
     """A stem at rest, with the pressures that did not move it.

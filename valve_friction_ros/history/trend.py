@@ -31,6 +31,7 @@ from valve_friction_ros.history.entry import (
 )
 from valve_friction_ros.identification.settings import SLIDING
 from valve_friction_ros.identification.trust.uncertainty import student_quantile
+from valve_friction_ros.model.checks import equal_by_fields
 from valve_friction_ros.response import ResponseSummary, summarised
 from valve_friction_ros.streams import DAY, utc
 from valve_friction_ros.usage import ValveUsage
@@ -182,6 +183,7 @@ class Limit(Enum):
     LOW = "low_ratio"
 
 
+@equal_by_fields
 @dataclass(frozen=True)
 class Crossing:
     """Expected crossing of the next limit.
@@ -197,6 +199,7 @@ class Crossing:
     latest: int
 
 
+@equal_by_fields
 @dataclass(frozen=True)
 class Trend:
     """The drift of a friction: a line through the days, N over ns since `begin`.

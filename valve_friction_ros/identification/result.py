@@ -33,7 +33,7 @@ from valve_friction_ros.identification.signature.valve_signature import ValveSig
 from valve_friction_ros.identification.trust.stated import CONTRADICTED, with_stated
 from valve_friction_ros.identification.trust.uncertainty import CORRELATION
 from valve_friction_ros.identification.trust.verdict import Misfit, Parameter, with_calibration
-from valve_friction_ros.model.checks import frozen, require_type, require_whole
+from valve_friction_ros.model.checks import equal_by_fields, frozen, require_type, require_whole
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.simulation import simulate
 from valve_friction_ros.model.valve import KarnoppParameters, Valve
@@ -56,6 +56,7 @@ class Support(Enum):
         )
 
 
+@equal_by_fields
 @dataclass(frozen=True)
 class ModelComparison:
     """Two models of one record.

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from valve_friction_ros.identification.steps.step_response import first_beyond, step_test
+from valve_friction_ros.model.checks import equal_by_fields
 from valve_friction_ros.signals import position_noise, quantisation_step
 from valve_friction_ros.streams import Samples
 
@@ -145,6 +146,7 @@ _T86 = -math.expm1(-2.0)
 _Values = NDArray[np.float64]
 
 
+@equal_by_fields
 @dataclass(frozen=True)
 class StepAnswer:
     """Response of stem and actuator to a step of the command.
@@ -335,6 +337,7 @@ so that the command seems constant."""
 _SQUARE, _SWINGING = 0.7, 0.5
 
 
+@equal_by_fields
 @dataclass(frozen=True)
 class Hunting:
     """A limit cycle at a constant command.

@@ -23,6 +23,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from valve_friction_ros.health.levels import Finding, Level, StatusSignal
+from valve_friction_ros.model.checks import equal_by_fields
 from valve_friction_ros.response.moves import Hunting, StepAnswer
 from valve_friction_ros.wording import Code, said
 
@@ -261,6 +262,7 @@ class ResponseLimits:
             raise ValueError("limits of the response must not be negative")
 
 
+@equal_by_fields
 @dataclass(frozen=True)
 class ResponseSummary:
     """Responses to the latest steps.

@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from valve_friction_ros.held_signals import FEWEST_BUNCHES, LONG_PAUSE, Pauses
 from valve_friction_ros.identification.refusal import LittleMotionError, RefusalError
+from valve_friction_ros.model.checks import equal_by_fields
 from valve_friction_ros.model.drive import Drive
 from valve_friction_ros.model.recording import Recording, StampedRecord, StampedSignal
 from valve_friction_ros.wording import lasting, percentage
@@ -347,6 +348,7 @@ _ON_GRID = 1e-3
 Chosen: at 1 kHz that is 1 µs, in which a stem at 0.1 m/s moves by 0.1 µm, below any noise."""
 
 
+@equal_by_fields
 @dataclass(frozen=True)
 class Gap:
     """The longest gap of signal `name`: `seconds` before `sample`, `since_start` s after the first.

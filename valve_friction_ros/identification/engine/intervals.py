@@ -41,6 +41,7 @@ from valve_friction_ros.identification.trust.uncertainty import (
     mean_over_distance,
     mean_speed,
 )
+from valve_friction_ros.model.checks import equal_by_fields
 
 RECTANGLE = 1.0 / math.sqrt(3.0)
 """Standard deviation of a rectangular distribution over its half width."""
@@ -207,6 +208,7 @@ _FINEST_OTHER = 5e-4
 """No interval is narrower than this share of its value, however quiet the record is."""
 
 
+@equal_by_fields
 @dataclass(frozen=True)
 class Estimated:
     """A number with its interval, SI unit, and its standard uncertainty by origin (after the GUM).

@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from valve_friction_ros.identification.refusal import RefusalError
-from valve_friction_ros.model.checks import require_positive
+from valve_friction_ros.model.checks import equal_by_fields, require_positive
 from valve_friction_ros.signals import (
     find_corners,
     longest_faithful_window,
@@ -154,6 +154,7 @@ class Bracket(NamedTuple):
     answered: float
 
 
+@equal_by_fields
 @dataclass(frozen=True)
 class StepMetrics:
     """Response to one step of the input.
@@ -197,6 +198,7 @@ class StepMetrics:
         return self.output_change / self.input_change
 
 
+@equal_by_fields
 @dataclass(frozen=True)
 class StepTest:
     """Step responses, dead band and resolution from a record of steps.

@@ -16,6 +16,7 @@ from enum import Enum
 from typing import TYPE_CHECKING
 
 from valve_friction_ros.identification.settings import PARAMETER_UNITS, IdentificationSettings
+from valve_friction_ros.model.checks import equal_by_fields
 from valve_friction_ros.model.drive import Drive
 from valve_friction_ros.wording import misfit_words, percentage, two_digits
 
@@ -52,6 +53,7 @@ class Verdict(Enum):
     FIXED = "fixed"
 
 
+@equal_by_fields
 @dataclass(frozen=True)
 class Parameter:
     """A parameter with its interval and its verdict.
@@ -269,6 +271,7 @@ Chosen below all simulated records, which have 0.96 and more, except in-service 
 at 100 Hz (0.84)."""
 
 
+@equal_by_fields
 @dataclass(frozen=True)
 class Misfit:
     """How well the simulated stem follows the measured one, or the modelled force the measured.
