@@ -20,6 +20,7 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
 
 from valve_friction_ros.figures.panels import COLOURS, dress, labelled_in, legend_above
+from valve_friction_ros.health.baseline import Baseline
 from valve_friction_ros.health.comparison import friction_name
 from valve_friction_ros.health.measured import DatedNumber
 from valve_friction_ros.history import (
@@ -189,6 +190,21 @@ def _draw_estimates(axes: Axes, history: ValveHistory, span: tuple[int, int]) ->
             capsize=2,
             label=f"{verdict.value}, 95 % interval",
         )
+    if of == SLIDING:
+        _draw_other_speeds(axes, history, baseline)
+
+
+def _draw_other_speeds(axes: Axes, history: ValveHistory, baseline: Baseline | None) -> None:
+    """Mark the sliding frictions that are not known at the speed of the baseline."""
+    known = [(entry, entry.parameters.get(SLIDING)) for entry in history.entries]
+    far = [
+        (entry.time, one.value)
+        for entry, one in known
+        if one is not None and one.value > 0 and entry.point(baseline) is None
+    ]
+    if far:
+        times, values = zip(*far, strict=True)
+        axes.plot(_dates(times), values, "x", color="0.4", ms=5, label="at another speed")
 
 
 def _with_room(points: Sequence[DatedNumber], span: tuple[int, int]) -> list[DatedNumber]:
