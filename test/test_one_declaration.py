@@ -70,7 +70,7 @@ node = SimpleNamespace(
     add_on_set_parameters_callback=id,
     add_pre_set_parameters_callback=id,
     add_post_set_parameters_callback=id,
-    declare_parameter=lambda name, *rest: declared.update({name: rest}),
+    declare_parameters=lambda _, rows: declared.update({name: rest for name, *rest in rows}),
 )
 declare_parameters(node, settings.NODES["identifier"])
 default, descriptor = declared["steps"]

@@ -71,11 +71,15 @@ def require_parameters(page, answer):
     assert [*table] == [WORDS[name] for name in answer["parameters"]]
     for name, told in answer["parameters"].items():
         value, interval, verdict, *published = table[WORDS[name]]
-        assert value == shown(told["value"])
         assert verdict == ": ".join(filter(None, (told["verdict"], told["reason"])))
         low, high = told["interval"]
-        has_interval = low is not None and low < high
-        assert interval == (f"{shown(low)} to {shown(high)}" if has_interval else "–")
+        if low is None or not low < high:
+            assert (value, interval) == (shown(told["value"]), "–")
+        else:
+            texts = (value, *interval.split(" to "))
+            for text, number in zip(texts, (told["value"], low, high), strict=True):
+                rounding = max(0.05 * told["half_width"], 5e-5 * abs(number))
+                assert float(text.replace("−", "-")) == pytest.approx(number, abs=rounding, rel=0)
         if answer["method"] == "bench":
             assert published == [shown(told["published"])]
 

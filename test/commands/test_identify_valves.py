@@ -181,7 +181,7 @@ def test_a_scale_of_the_sensor_qualifies_the_friction(
     report = PageReader(page.read_text())
     # Half as much again is beyond spring_failure: an error, but of the sensors.
     assert (report.status[0], report.status[2]) == ("red", "Check the sensors' scales")
-    assert "before any work on the packing, check the scale of the pressure sensor" in report.text
+    assert "Before any work on the packing, check the scale of the pressure sensor" in report.text
     assert "plan work on the packing" not in report.text
 
 

@@ -289,8 +289,8 @@ def test_a_drag_over_the_trend_chooses_its_time(tab):
     page.mouse.up()
     page.wait_for_function(f"{shown} < 100")
     axis = f"{TREND}.chart.getOption().xAxis[0]"
-    everything = page.get_by_role("button", name="all", exact=True)
-    assert everything.get_attribute("aria-pressed") == "false"
+    everything = page.get_by_role("button", name="all", exact=True).element_handle()
+    page.wait_for_function("one => one.ariaPressed === 'false'", arg=everything)
     hour = page.get_by_role("button", name="1 h", exact=True)
     hour.click()
     page.wait_for_function("one => one.ariaPressed === 'true'", arg=hour.element_handle())

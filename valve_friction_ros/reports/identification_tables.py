@@ -38,7 +38,6 @@ from valve_friction_ros.reports.page import Column, PageTable, Verbatim
 from valve_friction_ros.wording import (
     in_zone,
     name_in_words,
-    number_and_width,
     percentage,
     ratio_interval,
     two_digits,
@@ -71,6 +70,11 @@ def written(value: float | None) -> str:
     return f"{value:.0f}" if abs(value) >= _WHOLE else f"{value:.5g}"
 
 
+def _to_width(value: float, half_width: float) -> float:
+    """Round a number to two digits of half the width of its interval, if that has a width."""
+    return round(value, 1 - math.floor(math.log10(half_width))) if half_width > 0 else value
+
+
 def words_of(name: str) -> str:
     """Return the name of a parameter in words, with its symbol."""
     return _WORDS.get(name, name_in_words(name))
@@ -85,16 +89,14 @@ def _is_estimated(one: Mapping[str, Any]) -> bool:
 
 
 def _cells(name: str, one: Mapping[str, Any]) -> tuple[str, ...]:
-    value, ends = written(one["value"]), _NOTHING
-    if _is_estimated(one):
-        low, high = one["interval"]
-        value, *both = (
-            number_and_width(size, (high - low) / 2)[0] for size in (one["value"], low, high)
-        )
-        ends = " to ".join(both)
+    value, ends = one["value"], _NOTHING
+    low, high = one["interval"]
+    if _is_estimated(one) and low is not None:
+        value, low, high = (_to_width(size, (high - low) / 2) for size in (value, low, high))
+        ends = f"{written(low)} to {written(high)}"
     return (
         _heading(name, one),
-        value,
+        written(value),
         ends,
         ": ".join(filter(None, (one["verdict"], one["reason"]))),
         written(one["published"]),
