@@ -262,7 +262,7 @@ class WrittenTimes:
         whole = np.where(known, floor + origin, 0).astype(np.int64) * size
         rest = np.rint(np.where(known, numbers - floor, 0) * size).astype(np.int64)
         stamps = whole + rest + later
-        is_rounded = np.abs(numbers) * size > _EXACT
+        is_rounded = np.abs(numbers) > _EXACT / size
         return np.where(known, np.where(is_rounded, (stamps + 500) // 1000 * 1000, stamps), NO_TIME)
 
     def _durations(self, texts: "pd.Series[str]") -> NDArray[np.int64]:
