@@ -16,12 +16,12 @@ from dataclasses import replace
 
 import matplotlib.image
 import pytest
-from histories import DAY, OTHER, START, VALVE, success
+from histories import DAY, OTHER, START, VALVE, at_other_speeds, success
 from histories import refused as refusal_at
 from kept_rows import csv_rows
 
 from valve_friction_ros.commands.arguments.declared import DECLARATIONS
-from valve_friction_ros.health import Baseline, FrictionLimits, Level, SlidingFriction
+from valve_friction_ros.health import Baseline, FrictionLimits, Level
 from valve_friction_ros.history import MONTH, HistoryFile, KeptBaseline
 from valve_friction_ros.identification import Verdict
 
@@ -89,12 +89,7 @@ class TestTable:
 
     def test_other_speeds_than_that_of_the_baseline(self, tmp_path, listed):
         """The list ended without a word, below a friction that grew from week to week."""
-        history = HistoryFile(tmp_path / "history.sqlite")
-        healthy = Baseline(sliding=SlidingFriction(300.0, 5.0, 0.8e-3))
-        history.set_baseline(VALVE, KeptBaseline(healthy, START + 1, START))
-        for week, (force, speed) in enumerate(((300, 0.8), (350, 6.0), (430, 8.0), (550, 9.0))):
-            slid = SlidingFriction(force, 5.0, speed * 1e-3)
-            history.add(success(START + week * 7 * DAY, sliding=slid, baseline=healthy))
+        history = at_other_speeds(tmp_path / "history.sqlite")
         assert "trend: none, because 3 of 4 records move" in " ".join(
             listed(path=history.path).split()
         )

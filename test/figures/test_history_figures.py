@@ -16,12 +16,12 @@ from itertools import pairwise
 import matplotlib.dates
 import numpy as np
 import pytest
-from histories import DAY, OTHER, START, VALVE, refused, success
+from histories import DAY, OTHER, START, VALVE, at_other_speeds, refused, success
 from matplotlib.container import ErrorbarContainer
 
 from valve_friction_ros.figures import trend_figure
 from valve_friction_ros.figures.history_figures import report_trend_figure, usage_figure
-from valve_friction_ros.health import Baseline, SlidingFriction
+from valve_friction_ros.health import Baseline
 from valve_friction_ros.history import (
     MONTH,
     HistoryFile,
@@ -59,12 +59,7 @@ def axes(history):
 
 def test_frictions_at_another_speed_are_crosses(tmp_path):
     """The panel was empty while friction grew."""
-    file = HistoryFile(tmp_path / "history.sqlite")
-    healthy = Baseline(sliding=SlidingFriction(300.0, 5.0, 0.8e-3))
-    file.set_baseline(VALVE, KeptBaseline(healthy, START + 1, START))
-    for week, (force, speed) in enumerate(((300, 0.8), (350, 6.0), (430, 8.0), (550, 9.0))):
-        slid = SlidingFriction(force, 5.0, speed * 1e-3)
-        file.add(success(START + week * 7 * DAY, sliding=slid, baseline=healthy))
+    file = at_other_speeds(tmp_path / "history.sqlite")
     (found,) = valve_histories(file, file.valves(), 0, START + 1000 * DAY)
     (panel,) = trend_figure([found]).axes
     assert labelled(panel, "at another speed").get_ydata().tolist() == [350.0, 430.0, 550.0]

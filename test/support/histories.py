@@ -16,16 +16,18 @@ from dataclasses import replace
 from pathlib import Path
 
 from valve_friction_ros.health import (
+    Baseline,
     Diagnosis,
     FrictionLimits,
     FrictionState,
     Level,
     MonitorSettings,
+    SlidingFriction,
     StatusSignal,
     compared,
 )
 from valve_friction_ros.health.diagnosis import friction_state
-from valve_friction_ros.history import HistoryEntry, KeptValve
+from valve_friction_ros.history import HistoryEntry, HistoryFile, KeptBaseline, KeptValve
 from valve_friction_ros.history.entry import Fit, Span, settings_text
 from valve_friction_ros.history.rows import state_columns
 from valve_friction_ros.identification import Parameter, Verdict
@@ -141,3 +143,14 @@ def make_version_5(history):
     tables = select(history, "SELECT name FROM sqlite_master WHERE type = 'table'")
     script += [f"DROP TABLE {name}" for (name,) in tables if name not in _OF_VERSION_5]
     change(history, f"{'; '.join(script)}; PRAGMA user_version = 5")
+
+
+def at_other_speeds(path):
+    """A history of four weeks in which friction grows, the last three at far higher speeds."""
+    file = HistoryFile(path)
+    healthy = Baseline(sliding=SlidingFriction(300.0, 5.0, 0.8e-3))
+    file.set_baseline(VALVE, KeptBaseline(healthy, START + 1, START))
+    for week, (force, speed) in enumerate(((300, 0.8), (350, 6.0), (430, 8.0), (550, 9.0))):
+        slid = SlidingFriction(force, 5.0, speed * 1e-3)
+        file.add(success(START + week * 7 * DAY, sliding=slid, baseline=healthy))
+    return file

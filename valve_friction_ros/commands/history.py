@@ -365,7 +365,7 @@ def _without_trend(history: ValveHistory) -> list[str]:
         for entry in history.entries
         if (one := entry.parameters.get(SLIDING)) and one.value > 0 and entry.time >= kept.since
     ]
-    far = [entry for entry in known if entry.point(healthy) is None]
+    far = [entry for entry in known if entry.is_at_other_speed(healthy)]
     if not far or len(known) < LEAST_ESTIMATES:
         return []
     speed = sentence(friction_name(SLIDING, healthy.sliding.speed))

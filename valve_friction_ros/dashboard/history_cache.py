@@ -214,8 +214,8 @@ class HistoryCache:
             for valve in {one.valve for one in found}:
                 self._sparks[valve] = sparkline(*zip(*self._ratios[valve], strict=True))
             self._histories.clear()
-            self.last = {valve.name: ValveView(valve.name, valve.tag) for valve in valves}
-            self.last |= {one.valve.name: _view_of_last(one) for one in last}
+            unknown = {valve.name: ValveView(valve.name, valve.tag) for valve in valves}
+            self.last = unknown | {one.valve.name: _view_of_last(one) for one in last}
             self.valves = valves  # last: other threads must find the rest complete
             self.revision += 1
             return True

@@ -196,11 +196,10 @@ def _draw_estimates(axes: Axes, history: ValveHistory, span: tuple[int, int]) ->
 
 def _draw_other_speeds(axes: Axes, history: ValveHistory, baseline: Baseline | None) -> None:
     """Mark the sliding frictions that are not known at the speed of the baseline."""
-    known = [(entry, entry.parameters.get(SLIDING)) for entry in history.entries]
     far = [
-        (entry.time, one.value)
-        for entry, one in known
-        if one is not None and one.value > 0 and entry.point(baseline) is None
+        (entry.time, entry.parameters[SLIDING].value)
+        for entry in history.entries
+        if entry.is_at_other_speed(baseline)
     ]
     if far:
         times, values = zip(*far, strict=True)

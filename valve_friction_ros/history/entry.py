@@ -244,6 +244,11 @@ class HistoryEntry(EarlierEstimate):
             self.time, self.parameters, self.sliding_speed, baseline, self.numbers
         )
 
+    def is_at_other_speed(self, baseline: Baseline | None) -> bool:
+        """Return whether its sliding friction is known, but not at the speed of a baseline."""
+        one = self.parameters.get(SLIDING)
+        return one is not None and one.value > 0 and self.point(baseline) is None
+
 
 def trended(baseline: Baseline | None) -> str:
     """Return the name of the friction whose trend is compared with a baseline."""

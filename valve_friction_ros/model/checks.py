@@ -31,13 +31,12 @@ def equal_by_fields(data: _Type) -> _Type:
     """
     names = tuple(one.name for one in fields(data) if one.compare)
 
+    def numbers(one: object) -> tuple[object, ...]:
+        return tuple(getattr(one, name) for name in names)
+
     def equal(self: object, other: object) -> Any:
-        if other.__class__ is not self.__class__:
-            return NotImplemented
-        return all(
-            mine is yours or mine == yours
-            for mine, yours in ((getattr(self, name), getattr(other, name)) for name in names)
-        )
+        is_alike = other.__class__ is self.__class__
+        return numbers(self) == numbers(other) if is_alike else NotImplemented
 
     data.__eq__ = equal  # type: ignore[assignment]
     return data

@@ -31,12 +31,12 @@ from valve_friction_ros.model.linear_motion import (
 )
 from valve_friction_ros.model.stem_motion import STRIBECK_STEP, advance_stem
 from valve_friction_ros.model.stem_tangent import (
-    FORGOTTEN,
     Tangent,
     begin_step,
     face,
     keep,
     set_anew,
+    unless_forgotten,
 )
 
 _FALLEN = 6.0
@@ -381,8 +381,8 @@ def _carry(
             viscous, spring, mass = facing[2, one], facing[3, one], facing[4, one]
             place += viscous * x_viscous + spring * x_spring + mass * x_mass
             following += viscous * v_viscous + spring * v_spring + mass * v_mass
-            state[0, one] = place if abs(place) > FORGOTTEN else 0.0
-            state[1, one] = following if abs(following) > FORGOTTEN else 0.0
+            state[0, one] = unless_forgotten(place)
+            state[1, one] = unless_forgotten(following)
             tangent.positions[sample + 1, one] = state[0, one]
 
 
@@ -426,8 +426,8 @@ def _carry_falling(
             after -= slip * then.share + stribeck * then.by_stribeck
             after -= facing[2, one] * w + facing[3, one] * y + facing[4, one] * b
             place, following = slid(slide, state[0, one], state[1, one], force, after - force)
-            state[0, one] = place if abs(place) > FORGOTTEN else 0.0
-            state[1, one] = following if abs(following) > FORGOTTEN else 0.0
+            state[0, one] = unless_forgotten(place)
+            state[1, one] = unless_forgotten(following)
             tangent.positions[sample + 1, one] = state[0, one]
 
 

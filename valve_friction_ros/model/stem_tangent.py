@@ -45,9 +45,15 @@ _STEEPEST = 4.0
 zero, the time of the drop has no derivative."""
 
 
-FORGOTTEN = 1e-100
+_FORGOTTEN = 1e-100
 """Derivative below which it is zero: one that decayed on to 1e-308 would slow the processor down
 tenfold."""
+
+
+@compiled
+def unless_forgotten(derivative: float) -> float:
+    """Return a derivative that decays, or zero where nothing of it is left."""
+    return derivative if abs(derivative) > _FORGOTTEN else 0.0
 
 
 class Tangent(NamedTuple):

@@ -345,10 +345,16 @@ class _AlarmPage:
         address = self._page.link
         shown = [(e, 1) for e in self._events] if one.is_journal else _merged(self._events)
         rows = [
-            _row(k, each, alarms, self._page.zone, address("/valve", node=each.valve.name),
-                 one.is_journal)
+            _row(
+                k,
+                each,
+                alarms,
+                self._page.zone,
+                address("/valve", node=each.valve.name),
+                one.is_journal,
+            )
             for k, (each, alarms) in enumerate(shown)
-        ]  # fmt: skip
+        ]
         empty = "No alarm matches the filters." if one.to_query() else "No current alarms."
         self._table.send({"rows": rows, "journal": one.is_journal, "empty": empty})
         waiting = sum(each.event.alarm.state.needs_answer for each in self._events)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from valve_friction_ros.model.compiled import compiled
 from valve_friction_ros.model.linear_motion import Dynamics
 from valve_friction_ros.model.stem_run import run_stem
-from valve_friction_ros.model.stem_tangent import FORGOTTEN, Tangent, no_tangent
+from valve_friction_ros.model.stem_tangent import Tangent, no_tangent, unless_forgotten
 
 _LEAST_LAG = 1e-9
 _LARGEST_ASYMMETRY = 0.9
@@ -120,7 +120,7 @@ def _lag(signals: NDArray[np.float64], lag: float, period: float) -> None:
             after = signals[step, one]
             lagged = decay * signals[step - 1, one] + newest * after
             lagged += (1.0 - decay - newest) * before[one]
-            signals[step, one] = lagged if abs(lagged) > FORGOTTEN else 0.0
+            signals[step, one] = unless_forgotten(lagged)
             before[one] = after
 
 

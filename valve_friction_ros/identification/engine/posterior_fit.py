@@ -189,24 +189,14 @@ def _common(own: NDArray[np.float64], cross: NDArray[np.float64]) -> NDArray[np.
     return np.asarray((back * np.clip(shares, _LEAST_COMMON, 1.0)) @ back.T, dtype=np.float64)
 
 
-class _Information(NamedTuple):
-    """Products of weighted derivatives: of each half with itself, of one with the other, (p, p).
-
-    Then those of the derivatives of one half with the residual of the other, shape (p,).
-    """
-
-    own: NDArray[np.float64]
-    cross: NDArray[np.float64]
-    gradient: NDArray[np.float64]
-
-
 def _information(
     slopes: NDArray[np.float64], scaled: NDArray[np.float64], weights: NDArray[np.float64]
-) -> _Information:
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Multiply derivatives, (2, p, c), by themselves and by the `scaled` residuals, (2, c).
 
-    This is done block by block. For larger blocks NumPy's library starts threads, which wait for
-    one another on a busy machine.
+    Return the products of each half with itself and of one with the other, (p, p), and those of the
+    derivatives of one half with the residual of the other, (p,). They are added up block by block:
+    for larger blocks NumPy's library starts threads, which wait for one another on a busy machine.
     """
     size, cells = slopes.shape[1:]
     same, apart, gradient = np.zeros((size, size)), np.zeros((size, size)), np.zeros(size)
@@ -217,7 +207,7 @@ def _information(
         same += total @ total.T
         apart += difference @ difference.T
         gradient += even @ scaled[1, block] + odd @ scaled[0, block]
-    return _Information(0.25 * (same + apart), 0.25 * (same - apart), 0.5 * gradient)
+    return 0.25 * (same + apart), 0.25 * (same - apart), 0.5 * gradient
 
 
 class _Problem:

@@ -215,14 +215,12 @@ def _changes(
     """
     for one in messages:
         if not node.has_parameter(one.name):
-            is_ignored = one.name.startswith("qos_overrides.")
-            hint = nearest(one.name, node.list_parameters([], 0).names)
-            yield SetParametersResult(
-                successful=is_ignored,
-                reason="ignored, as the node does not have this topic"
-                if is_ignored
-                else f"{node.get_name()} has no parameter {one.name!r}: {hint}",
-            )
+            if is_ignored := one.name.startswith("qos_overrides."):
+                reason = "ignored, as the node does not have this topic"
+            else:
+                hint = nearest(one.name, node.list_parameters([], 0).names)
+                reason = f"{node.get_name()} has no parameter {one.name!r}: {hint}"
+            yield SetParametersResult(successful=is_ignored, reason=reason)
             continue
         try:
             yield Parameter.from_parameter_msg(one)
